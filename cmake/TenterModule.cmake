@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# One folder, one module, one library target tenter::<name>.
+#
+#   tenter_module(<name> [PUBLIC lib...] [PRIVATE lib...] [TEST_LIBS lib...])
+#
+# Sources are src/*.cpp, unit tests are test/*_test.cpp (one executable, <name>_tests). A module sees the
+# headers of what it names and nothing else, so an upward or sideways include does not compile.
+include(GoogleTest)
+
+function(tenter_module name)
+  cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;TEST_LIBS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS src/*.cpp src/*.h)
+  add_library(tenter_${name} STATIC ${sources})
+  add_library(tenter::${name} ALIAS tenter_${name})
+  target_include_directories(tenter_${name} PUBLIC include PRIVATE src)
+  target_link_libraries(tenter_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} tenter_warnings)
+
+  file(GLOB tests CONFIGURE_DEPENDS test/*_test.cpp)
+  if(tests)
+    add_executable(${name}_tests ${tests})
+    target_include_directories(${name}_tests PRIVATE src test)
+    target_link_libraries(${name}_tests PRIVATE tenter_${name} tenter_test_support ${ARG_TEST_LIBS}
+                                                GTest::gmock GTest::gtest_main tenter_warnings)
+    gtest_discover_tests(${name}_tests PROPERTIES LABELS unit DISCOVERY_TIMEOUT 60)
+  endif()
+endfunction()
+
+add_library(tenter_warnings INTERFACE)
+target_compile_options(tenter_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+                                                 -Wno-sign-conversion -Werror)

@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# -DTENTER_SANITIZE=address,undefined (or thread) instruments everything that this project compiles.
+set(TENTER_SANITIZE "" CACHE STRING "Sanitizers to compile with, as -fsanitize takes them")
+if(TENTER_SANITIZE)
+  add_compile_options(-fsanitize=${TENTER_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_link_options(-fsanitize=${TENTER_SANITIZE})
+endif()
