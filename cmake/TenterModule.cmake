@@ -7,9 +7,18 @@
 # headers of what it names and nothing else, so an upward or sideways include does not compile.
 include(GoogleTest)
 
+add_custom_target(unit_tests COMMENT "All executables of unit tests")
+
 function(tenter_module name)
   cmake_parse_arguments(ARG "" "" "PUBLIC;PRIVATE;TEST_LIBS" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS src/*.cpp src/*.h)
+  file(GLOB sources CONFIGURE_DEPENDS src/*.cpp)
+  if(NOT sources)  # nothing but headers yet
+    add_library(tenter_${name} INTERFACE)
+    add_library(tenter::${name} ALIAS tenter_${name})
+    target_include_directories(tenter_${name} INTERFACE include)
+    target_link_libraries(tenter_${name} INTERFACE ${ARG_PUBLIC} ${ARG_PRIVATE})
+    return()
+  endif()
   add_library(tenter_${name} STATIC ${sources})
   add_library(tenter::${name} ALIAS tenter_${name})
   target_include_directories(tenter_${name} PUBLIC include PRIVATE src)
@@ -21,10 +30,7 @@ function(tenter_module name)
     target_include_directories(${name}_tests PRIVATE src test)
     target_link_libraries(${name}_tests PRIVATE tenter_${name} tenter_test_support ${ARG_TEST_LIBS}
                                                 GTest::gmock GTest::gtest_main tenter_warnings)
+    add_dependencies(unit_tests ${name}_tests)
     gtest_discover_tests(${name}_tests PROPERTIES LABELS unit DISCOVERY_TIMEOUT 60)
   endif()
 endfunction()
-
-add_library(tenter_warnings INTERFACE)
-target_compile_options(tenter_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-                                                 -Wno-sign-conversion -Werror)

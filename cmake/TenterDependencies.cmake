@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Every library that more than one module may link, found once, in the sizes Debian 12 ships. A module links
+# what it names; finding a library here does not put it on anybody's include path.
+set(CMAKE_FIND_PACKAGE_TARGETS_GLOBAL ON)  # a static module hands its private libraries on to whoever links it
+
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(nlohmann_json 3.11 REQUIRED)
+find_package(OpenSSL REQUIRED COMPONENTS Crypto)
+find_package(tomlplusplus 3.3 REQUIRED)
+find_package(CLI11 2.1 REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(TBB REQUIRED)
+find_package(Ceres 2.1 REQUIRED)
+find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOPLY IOXML)
+
+# tenter_cholmod: SuiteSparse 5.12 of Debian comes without a CMake package.
+find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+add_library(tenter_cholmod INTERFACE)
+add_library(tenter::cholmod ALIAS tenter_cholmod)
+target_include_directories(tenter_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
+target_link_libraries(tenter_cholmod INTERFACE ${CHOLMOD_LIBRARY})
+
+# tests only
+find_package(GTest 1.12 REQUIRED)
+find_package(valijson REQUIRED)
+if(TENTER_BENCHMARKS)
+  find_package(benchmark REQUIRED)
+endif()
