@@ -8,4 +8,4 @@ mode=(-i)
 if [[ "${1:-}" == --check ]]; then
   mode=(--dry-run -Werror)
 fi
-git ls-files -z -- '*.cpp' '*.h' | xargs -0 -r -n 16 -P "$(nproc)" clang-format-16 "${mode[@]}"
+git -c safe.directory="*" ls-files -z -- '*.cpp' '*.h' | xargs -0 -r -n 16 -P "$(nproc)" clang-format-16 "${mode[@]}"
