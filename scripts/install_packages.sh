@@ -43,14 +43,16 @@ if [[ "$(id -u)" -ne 0 ]]; then
 fi
 log="$(mktemp)"
 trap 'rm -f "$log"' EXIT
-aptGet() {
-  if ! "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get --quiet --option DPkg::Lock::Timeout=300 "$@" </dev/null >"$log" 2>&1; then
+run() {
+  if ! "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive "$@" </dev/null >"$log" 2>&1; then
     tail -n 30 "$log" >&2
-    echo "apt-get $1 failed; its last lines stand above." >&2
+    echo "'$*' failed; its last lines stand above." >&2
     exit 1
   fi
 }
-aptGet update
-aptGet install --yes --no-install-recommends "${missing[@]}"
+# Minimal images leave manual pages out, and then OpenJDK, on which libvtk9-dev depends, does not configure.
+run mkdir -p /usr/share/man/man1
+run dpkg --configure -a  # finishes what an interrupted run left
+run apt-get --quiet update
+run apt-get --quiet --option DPkg::Lock::Timeout=300 install --yes --no-install-recommends "${missing[@]}"
 echo "Packages: done."
