@@ -14,15 +14,16 @@ namespace tenter {
 
 /// How membrane strain is measured.
 enum class MembraneElement {
-  kStvk,     ///< Green-Lagrange per triangle [Est12] eq. 3: (|w_u|^2-1)/2, (|w_v|^2-1)/2, w_u . w_v.
-  kSoft,     ///< |w_u|-1, |w_v|-1, w_u . w_v per triangle [Est12] eq. 4 [BW98].
+  kStvk,  ///< Green-Lagrange per triangle [Est12] eq. 3: (|w_u|^2-1)/2, (|w_v|^2-1)/2, w_u . w_v.
+  kSoft,  ///< |w_u|-1, |w_v|-1, w_u . w_v per triangle [Est12] eq. 4 [BW98].
   kSprings,  ///< Ring-1 springs on a grid [Est12] eq. 1.
   kEdges,    ///< Every mesh edge a spring, k_L (L - L0)^2 / (2 L0) [Inv18] eq. 9.
 };
 
 /// How bending strain is measured.
 enum class BendingElement {
-  kHinge,     ///< Dihedral angles of the edges, as curvature per triangle (docs/mechanics.md); B(kappa) [N m].
+  kHinge,     ///< Dihedral angles of the edges, as curvature per triangle (docs/mechanics.md);
+              ///< B(kappa) [N m].
   kSprings,   ///< Ring-2 springs on a grid [Est12] sec. 4.1; mesh-dependent.
   kRawHinge,  ///< k_theta/2 * 3 L^2/A (theta - theta0)^2 [Inv18] eq. 10.
 };
@@ -37,17 +38,29 @@ struct ComponentInfo {
   bool may_be_negative = false;     ///< Couplings.
 };
 
-/// One row of the registry: everything that parsing, fitting, tests and documentation need to know of a model.
+/// Curves, and bases where they are to be fitted, one per component of a model in the registry's
+/// order.
+struct ComponentCurve {
+  StiffnessCurve curve = StiffnessCurve::constant(0.0);
+  std::shared_ptr<const SplineBasis> basis;  ///< Null: fixed, no parameters.
+};
+
+using LawFactory = std::shared_ptr<StrainLaw> (*)(std::span<const ComponentCurve>);
+
+/// One row of the registry: everything that parsing, fitting, tests and documentation need to know
+/// of a model.
 struct ClothModel {
   std::string_view id;
   std::string_view description;
-  std::string_view source;       ///< Reference key and equation.
+  std::string_view source;  ///< Reference key and equation.
   MembraneElement membrane;
   BendingElement bending;
-  bool needs_grid = false;       ///< Springs: only on grid sheets.
+  bool needs_grid = false;  ///< Springs: only on grid sheets.
   bool fittable = true;
   std::span<const ComponentInfo> membrane_components;
   std::span<const ComponentInfo> bending_components;
+  LawFactory membrane_law;  ///< From the curves of the membrane components.
+  LawFactory bending_law;   ///< From the curves of the bending components.
 
   int componentIndex(std::string_view name) const;  ///< Over membrane, then bending; -1 if absent.
   const ComponentInfo& component(int index) const;
@@ -59,12 +72,6 @@ std::span<const ClothModel> clothModels();
 
 /// Error names the models there are.
 Result<const ClothModel*> findClothModel(std::string_view id);
-
-/// Curves, and bases where they are to be fitted, one per component of a model in the registry's order.
-struct ComponentCurve {
-  StiffnessCurve curve = StiffnessCurve::constant(0.0);
-  std::shared_ptr<const SplineBasis> basis;  ///< Null: fixed, no parameters.
-};
 
 /// The laws that a sheet of this model computes with.
 struct ClothLaws {
