@@ -1,7 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: GPL-3.0-or-later
 # House rules that no compiler checks, over all tracked files: a licence line in every source, no file past
-# 600 lines, no path of somebody's machine. Prints each breach; exit 77 says that there is no git checkout here.
+# 600 lines, no path of somebody's machine, no link of a document to a file that is not there. Prints each breach;
+# exit 77 says that there is no git checkout here.
 set -euo pipefail
 cd "${1:-$(dirname "${BASH_SOURCE[0]}")/../..}"
 
@@ -35,6 +36,13 @@ while IFS= read -r file; do
   lines=$(wc -l <"$file")
   [[ $lines -le $max_lines ]] || breach "$file: $lines lines, $max_lines are allowed"
 done < <(tracked '*.cpp' '*.h' '*.cmake' '*CMakeLists.txt' '*.sh' '*.py' '*.toml' '*.md')
+
+while IFS= read -r document; do
+  [[ -f "$document" ]] || continue
+  while IFS= read -r target; do
+    [[ -e "$(dirname "$document")/$target" ]] || breach "$document: links to $target, which is not there"
+  done < <(sed 's/<!--.*-->//' "$document" | grep -oE '\]\([^)# ]+' | cut -c3- | grep -vE '^[a-z]+:' || true)
+done < <(tracked '*.md')
 
 while IFS= read -r hit; do
   breach "$hit: names a path of one machine"
