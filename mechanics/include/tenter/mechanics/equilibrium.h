@@ -38,7 +38,7 @@ struct EquilibriumSummary {
 };
 
 /// Newton's method on the energy with the exact Hessian; element-wise projection only when it is indefinite; sparse Cholesky
-/// analysed once per solver and reused. A failed solve leaves the state as it was.
+/// analysed once per solver and reused. After a failed solve the state is the best so far, and the summary says why it failed.
 class EquilibriumSolver {
  public:
   explicit EquilibriumSolver(const ClothSystem& system);

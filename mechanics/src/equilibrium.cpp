@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tenter/mechanics/equilibrium.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "smallest_eigenvalue.h"
+#include "sparse_cholesky.h"
+
+namespace tenter {
+namespace {
+
+constexpr double kForceToleranceOfNodeWeight = 1e-4;
+/// Forces are resolved to this many roundings of the positions, times the stiffest degree of freedom.
+constexpr double kRoundings = 8.0;
+constexpr double kArmijo = 1e-4;
+constexpr int kMaxBacktracks = 40;
+constexpr int kMaxSaddles = 20;
+
+using Clock = std::chrono::steady_clock;
+
+}  // namespace
+
+struct EquilibriumSolver::Impl {
+  explicit Impl(const ClothSystem& s)
+      : system(s), cholesky(s.hessian(s.restState(), Projection::kNone)), mass(s.dofMass()) {
+    g.resize(s.dofCount());
+    trial_g.resize(s.dofCount());
+    step.resize(s.dofCount());
+    // Edge rotations have no mass; any positive weight serves where a shift needs one.
+    shift_weights = mass.cwiseMax(mass.maxCoeff() * 1e-3);
+  }
+
+  const ClothSystem& system;
+  SparseCholesky cholesky;
+  Eigen::VectorXd mass, shift_weights;
+  Eigen::VectorXd g, trial_g, step;
+  ClothState trial;
+  double damping = 0.0;  ///< Of the last indefinite step; warm start for the next.
+
+  double roundingOfForces(const ClothState& state) const;
+  double residual(const Eigen::VectorXd& gradient) const { return gradient.cwiseAbs().maxCoeff(); }
+  bool newtonDirection(const ClothState& state, EquilibriumSummary& summary);
+  bool lineSearch(ClothState& state, double& energy);
+  bool leaveSaddle(ClothState& state, double& energy);
+  void measureStability(const ClothState& state, EquilibriumSummary& summary);
+  Termination iterate(ClothState& state, const EquilibriumOptions& options, EquilibriumSummary& summary,
+                      Clock::time_point start);
+};
+
+/// step = -H^-1 g with the exact Hessian if it is positive definite, else with the projected one, shifted if need be.
+/// Returns whether the exact one served.
+bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state, EquilibriumSummary& summary) {
+  ++summary.factorizations;
+  if (cholesky.factorize(system.hessian(state, Projection::kNone))) {
+    cholesky.solve(g, step);
+    step = -step;
+    return true;
+  }
+  const SparseLower& projected = system.hessian(state, Projection::kPositiveSemiDefinite);
+  double scale = 0.0;
+  for (int c = 0; c < projected.size; ++c) {
+    scale = std::max(scale, projected.value[projected.column_begin[c]] / shift_weights[c]);
+  }
+  for (double shift = 1e-10 * scale;; shift *= 100.0) {
+    ++summary.factorizations;
+    if (cholesky.factorize(projected, shift, &shift_weights)) break;
+    if (shift > 1e3 * scale || !std::isfinite(scale)) {
+      step = -g.cwiseQuotient(shift_weights);
+      return false;
+    }
+  }
+  cholesky.solve(g, step);
+  step = -step;
+  return false;
+}
+
+double EquilibriumSolver::Impl::roundingOfForces(const ClothState& state) const {
+  const SparseLower& h = system.hessian(state, Projection::kNone);
+  double stiffest = 0.0;
+  for (int c = 0; c < h.size; ++c) stiffest = std::max(stiffest, h.value[h.column_begin[c]]);
+  return kRoundings * std::numeric_limits<double>::epsilon() * stiffest * state.q.cwiseAbs().maxCoeff();
+}
+
+/// Backtracks until the energy falls enough or, where rounding hides the energy's change, until the residual falls.
+bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
+  const double slope = g.dot(step);
+  const double size = state.q.cwiseAbs().maxCoeff();
+  // A step longer than the sheet is never meant.
+  double alpha = std::min(1.0, std::max(size, 1e-3) / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
+  const double rounding = 1e-13 * std::max(std::abs(energy), std::abs(slope));
+  const double before = residual(g);
+  for (int k = 0; k < kMaxBacktracks; ++k, alpha *= 0.5) {
+    trial = state;
+    system.advance(trial, step, alpha);
+    const double e = system.energy(trial);
+    if (!std::isfinite(e)) continue;
+    const double wanted = kArmijo * alpha * slope;
+    const bool visible = std::abs(wanted) > rounding;
+    if (visible && e > energy + wanted) continue;
+    system.gradient(trial, trial_g);
+    if (!visible && !(residual(trial_g) < before) && !(e < energy + wanted)) continue;
+    std::swap(state, trial);
+    std::swap(g, trial_g);
+    energy = e;
+    return true;
+  }
+  return false;
+}
+
+/// Moves along a direction of negative curvature to lower energy.
+bool EquilibriumSolver::Impl::leaveSaddle(ClothState& state, double& energy) {
+  const Eigen::VectorXd v = cholesky.negativeDirection(system.hessian(state, Projection::kNone));
+  if (v.size() == 0) return false;
+  const double size = std::max(state.q.cwiseAbs().maxCoeff(), 1e-3);
+  const double unit = size / v.cwiseAbs().maxCoeff();
+  double best = energy;
+  ClothState best_state;
+  for (double length = 1e-5; length < 0.2; length *= 3.0) {
+    bool better = false;
+    for (double sign : {1.0, -1.0}) {
+      trial = state;
+      system.advance(trial, v, sign * length * unit);
+      const double e = system.energy(trial);
+      if (std::isfinite(e) && e < best) {
+        best = e;
+        best_state = trial;
+        better = true;
+      }
+    }
+    if (!better && best < energy) break;
+  }
+  if (!(best < energy)) return false;
+  state = best_state;
+  energy = best;
+  system.gradient(state, g);
+  return true;
+}
+
+Termination EquilibriumSolver::Impl::iterate(ClothState& state, const EquilibriumOptions& options,
+                                             EquilibriumSummary& summary, Clock::time_point start) {
+  const double tolerance = options.force_tolerance_N > 0.0
+                               ? options.force_tolerance_N
+                               : kForceToleranceOfNodeWeight * system.lightestFreeNodeWeight_N();
+  double energy = system.energy(state);
+  system.gradient(state, g);
+  int saddles = 0;
+  for (int k = 0;; ++k) {
+    summary.residual_N = residual(g);
+    summary.energy_J = energy;
+    if (!std::isfinite(summary.residual_N) || !std::isfinite(energy)) return Termination::kNotFinite;
+    if (options.progress) options.progress(k, summary.residual_N);
+    const bool small = summary.residual_N <= tolerance;
+    if (small && !options.leave_saddles) return Termination::kConverged;
+    if (k >= options.max_iterations) return Termination::kIterationLimit;
+    if (options.cancelled && options.cancelled()) return Termination::kCancelled;
+    if (options.time_budget_s > 0.0 &&
+        std::chrono::duration<double>(Clock::now() - start).count() > options.time_budget_s) {
+      return Termination::kTimeBudget;
+    }
+    if (small) {
+      ++summary.factorizations;
+      summary.stable = cholesky.factorize(system.hessian(state, Projection::kNone));
+      if (summary.stable || ++saddles > kMaxSaddles || !leaveSaddle(state, energy)) return Termination::kConverged;
+      continue;
+    }
+    const bool exact = newtonDirection(state, summary);
+    ++summary.newton_steps;
+    if (lineSearch(state, energy)) continue;
+    // At the limit of rounding no step can show progress: that is convergence if forces are at that limit too.
+    if (exact && summary.residual_N <= std::max(tolerance, roundingOfForces(state))) {
+      summary.stable = true;
+      return Termination::kConverged;
+    }
+    if (saddles++ < kMaxSaddles && !exact && leaveSaddle(state, energy)) continue;
+    return Termination::kLineSearchFailed;
+  }
+}
+
+void EquilibriumSolver::Impl::measureStability(const ClothState& state, EquilibriumSummary& summary) {
+  const SparseLower& h = system.hessian(state, Projection::kNone);
+  const SmallestEigenvalue pair = smallestEigenvalue(h, mass, cholesky);
+  summary.lambda_min_per_s2 = pair.value;
+  summary.lambda_min_residual_per_s2 = pair.residual;
+  summary.stable = pair.positive_definite;
+}
+
+EquilibriumSolver::EquilibriumSolver(const ClothSystem& system) : impl_(std::make_unique<Impl>(system)) {}
+EquilibriumSolver::EquilibriumSolver(EquilibriumSolver&&) noexcept = default;
+EquilibriumSolver::~EquilibriumSolver() = default;
+
+EquilibriumSummary EquilibriumSolver::solve(ClothState& state, const EquilibriumOptions& options) {
+  const auto start = Clock::now();
+  EquilibriumSummary summary;
+  summary.lambda_min_per_s2 = summary.lambda_min_residual_per_s2 = std::numeric_limits<double>::quiet_NaN();
+  const ClothState before = state;
+  summary.termination = impl_->iterate(state, options, summary, start);
+  if (summary.converged()) {
+    if (!options.leave_saddles) {
+      ++summary.factorizations;
+      summary.stable = factorize(state);
+    }
+    if (options.compute_lambda_min) impl_->measureStability(state, summary);
+  } else if (summary.termination == Termination::kNotFinite) {
+    state = before;
+  }
+  summary.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  return summary;
+}
+
+bool EquilibriumSolver::factorize(const ClothState& state) {
+  return impl_->cholesky.factorize(impl_->system.hessian(state, Projection::kNone));
+}
+
+Eigen::MatrixXd EquilibriumSolver::solveLinear(const Eigen::MatrixXd& rhs) { return impl_->cholesky.solve(rhs); }
+
+std::string describe(Termination termination) {
+  switch (termination) {
+    case Termination::kConverged: return "converged";
+    case Termination::kIterationLimit: return "iteration limit reached";
+    case Termination::kLineSearchFailed: return "no step lowers the energy";
+    case Termination::kTimeBudget: return "time budget used up";
+    case Termination::kCancelled: return "cancelled";
+    case Termination::kNotFinite: return "energy or forces are not finite";
+  }
+  return "unknown";
+}
+
+}  // namespace tenter
