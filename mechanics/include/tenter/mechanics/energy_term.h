@@ -7,8 +7,9 @@
 
 namespace tenter {
 
-/// Coordinates of a sheet in one vector q: node i at 3i .. 3i+2 [m], then the edge rotations of the bending term,
-/// each times its edge's length so that every entry is in metres and every force in newtons.
+/// Coordinates of a sheet in one vector q: node i at 3i .. 3i+2 [m], then the edge rotations of the
+/// bending term, each times its edge's length so that every entry is in metres and every force in
+/// newtons.
 
 /// Whether indefinite element Hessians are replaced by their nearest positive semi-definite ones.
 enum class Projection { kNone, kPositiveSemiDefinite };
@@ -30,8 +31,9 @@ class HessianSink {
   virtual void add(int element, const double* block) = 0;
 };
 
-/// One kind of energy on a sheet: membrane triangles, springs, hinges, gravity. Const members never allocate (after
-/// construction) and may be called from several threads; q always has coordinateCount entries.
+/// One kind of energy on a sheet: membrane triangles, springs, hinges, gravity. Const members never
+/// allocate (after construction) and may be called from several threads; q always has
+/// coordinateCount entries.
 class EnergyTerm {
  public:
   virtual ~EnergyTerm() = default;
@@ -40,19 +42,25 @@ class EnergyTerm {
   /// Adds dE/dq.
   virtual void addGradient(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) const = 0;
   /// Calls sink.add for every element, in order.
-  virtual void addHessian(const Eigen::VectorXd& q, Projection projection, HessianSink& sink) const = 0;
+  virtual void addHessian(const Eigen::VectorXd& q, Projection projection,
+                          HessianSink& sink) const = 0;
 
-  /// Parameters of the term's law, and d(dE/dq)/dp added to a coordinateCount x parameterCount matrix.
+  /// Parameters of the term's law, and d(dE/dq)/dp added to a coordinateCount x parameterCount
+  /// matrix.
   virtual int parameterCount() const { return 0; }
   virtual void addParameterGradient(const Eigen::VectorXd& /*q*/,
                                     Eigen::Ref<Eigen::MatrixXd> /*derivative*/) const {}
-  /// Strains of every element for histograms and reports: 3 x elements (0 where an element has no such component); empty if it has none.
-  virtual void strains(const Eigen::VectorXd& /*q*/, Eigen::Matrix3Xd& out) const { out.resize(3, 0); }
+  /// Strains of every element for histograms and reports: 3 x elements (0 where an element has no
+  /// such component); empty if it has none.
+  virtual void strains(const Eigen::VectorXd& /*q*/, Eigen::Matrix3Xd& out) const {
+    out.resize(3, 0);
+  }
   /// Rest area of every element [m^2], the weight of its strains. Springs: area of the spring.
   virtual Eigen::VectorXd elementAreas() const { return {}; }
 };
 
-/// Nearest positive semi-definite matrix of a small symmetric block, in place (eigenvalues clamped at 0).
+/// Nearest positive semi-definite matrix of a small symmetric block, in place (eigenvalues clamped
+/// at 0).
 void projectPositiveSemiDefinite(Eigen::Ref<Eigen::MatrixXd> block);
 
 }  // namespace tenter

@@ -13,7 +13,8 @@ namespace tenter {
 /// How the quads of a grid are split.
 enum class DiagonalPattern { kUniform, kAlternating };
 
-/// Rows and columns of a grid sheet; node (i, j) has id j * u_lines.size() + i, at (u_lines[i], v_lines[j]).
+/// Rows and columns of a grid sheet; node (i, j) has id j * u_lines.size() + i, at (u_lines[i],
+/// v_lines[j]).
 struct GridLines {
   std::vector<double> u_lines, v_lines;  ///< Increasing material coordinates [m].
   DiagonalPattern diagonals = DiagonalPattern::kUniform;
@@ -22,14 +23,17 @@ struct GridLines {
 
 /// The mesh that a simulation runs on: rest shape, material directions, topology.
 struct SheetMesh {
-  TriangleMesh rest;       ///< Always with uv.
+  TriangleMesh rest;  ///< Always with uv.
   MeshTopology topology;
   std::optional<GridLines> grid;
-  std::string pattern;     ///< "grid 25x25 uniform", "mesh 1234 vertices": recorded with materials.
+  std::string pattern;  ///< "grid 25x25 uniform", "mesh 1234 vertices": recorded with materials.
 
-  /// Rest triangle in its own plane with the first axis along the weft: inverse of the 2 x 2 edge matrix, and area [m^2].
-  /// The metric is that of the rest positions; uv gives the direction only.
-  struct RestTriangle { Mat2 edges_inverse; double area_m2; };
+  /// Rest triangle in its own plane with the first axis along the weft: inverse of the 2 x 2 edge
+  /// matrix, and area [m^2]. The metric is that of the rest positions; uv gives the direction only.
+  struct RestTriangle {
+    Mat2 edges_inverse;
+    double area_m2;
+  };
   std::vector<RestTriangle> triangles;
 
   int nodeCount() const { return rest.vertexCount(); }
@@ -41,13 +45,15 @@ struct SheetMesh {
 SheetMesh gridSheet(GridLines lines);
 /// n x m equal intervals' nodes over [0, size]; counts are nodes.
 SheetMesh gridSheet(Vec2 size_m, int nodes_u, int nodes_v, DiagonalPattern diagonals);
-/// `nodes` lines over [begin, end] with the nearest lines moved onto `stops` (clip and table edges); spacing stays within a
-/// factor of two of uniform where the stops allow.
+/// `nodes` lines over [begin, end] with the nearest lines moved onto `stops` (clip and table
+/// edges); spacing stays within a factor of two of uniform where the stops allow.
 std::vector<double> linesThrough(double begin, double end, int nodes, std::vector<double> stops);
-/// Flat rectangle with irregular triangles (jittered points, Delaunay), seeded; for tests of mesh independence.
+/// Flat rectangle with irregular triangles (jittered points, Delaunay), seeded; for tests of mesh
+/// independence.
 SheetMesh unstructuredSheet(Vec2 size_m, double edge_m, std::uint64_t seed);
-/// From a mesh file. Without uv a flat mesh takes its own x, y (after rotation into the plane); a curved one without uv is an error
-/// unless `isotropic` (directions do not matter), when each triangle gets any frame.
+/// From a mesh file. Without uv a flat mesh takes its own x, y (after rotation into the plane); a
+/// curved one without uv is an error unless `isotropic` (directions do not matter), when each
+/// triangle gets any frame.
 Result<SheetMesh> sheetFromMesh(const TriangleMesh& mesh, bool isotropic);
 
 }  // namespace tenter
