@@ -16,11 +16,16 @@ thread_local volatile std::size_t count = 0;
 
 extern "C" {
 void* __real_malloc(std::size_t size);
+void* __real_calloc(std::size_t items, std::size_t size);
 void* __real__Znwm(std::size_t size);
 void* __real__Znam(std::size_t size);
 void* __wrap_malloc(std::size_t size) {
   count = count + 1;
   return __real_malloc(size);
+}
+void* __wrap_calloc(std::size_t items, std::size_t size) {
+  count = count + 1;
+  return __real_calloc(items, size);
 }
 void* __wrap__Znwm(std::size_t size) {
   count = count + 1;
