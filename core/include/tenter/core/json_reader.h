@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -64,6 +65,16 @@ class JsonReader {
   const nlohmann::json& json() const { return *value_; }
 
  private:
+  const nlohmann::json* find(const std::string& key, bool required);
+  const nlohmann::json* findArray(const std::string& key);
+  std::string placeOf(const std::string& key) const;
+  JsonReader child(const nlohmann::json* value, const std::string& place);
+  double checkedNumber(const nlohmann::json& value, const std::string& key, const Range& range);
+  std::int64_t checkedInteger(const nlohmann::json& value, const std::string& key,
+                              std::int64_t min, std::int64_t max);
+  std::string checkedText(const nlohmann::json& value, const std::string& key,
+                          std::size_t max_length);
+
   const nlohmann::json* value_;
   std::string file_, place_;
   std::shared_ptr<std::optional<Error>> error_;
