@@ -25,10 +25,10 @@ struct Fabric {
   std::string_view description;
   double areal_density_kg_per_m2 = 0.0;
   double thickness_m = 0.0;
-  MembraneConstants membrane;
-  BendingConstants bending;
-  FrictionConstants friction;
-  FabricLimits limits;
+  MembraneConstants membrane = {};
+  BendingConstants bending = {};
+  FrictionConstants friction = {};
+  FabricLimits limits = {};
 };
 
 /// All fabrics. To add one: its row in fabrics.cpp.
