@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "command.h"
+
+#include <cstdio>
+
+namespace tenter::app {
+
+void Console::say(const std::string& line) const {
+  if (!json && !quiet) std::fprintf(stdout, "%s\n", line.c_str());
+}
+
+void Console::warn(const std::string& line) const {
+  if (!quiet) std::fprintf(stderr, "tenter: %s\n", line.c_str());
+}
+
+void Console::fail(const Error& error) {
+  std::fprintf(stderr, "tenter: %s\n", error.message().c_str());
+  answer["error"] = {{"exit_code", static_cast<int>(error.kind)},
+                     {"file", error.file},
+                     {"place", error.place},
+                     {"reason", error.reason},
+                     {"advice", error.advice}};
+}
+
+void Console::printAnswer() const {
+  if (!json) return;
+  // File names need not be UTF-8.
+  const auto replace = nlohmann::json::error_handler_t::replace;
+  std::fprintf(stdout, "%s\n", answer.dump(2, ' ', false, replace).c_str());
+}
+
+void addSubcommands(CLI::App& command, std::span<const Verb> rows, Action& action) {
+  for (const Verb& row : rows) {
+    row.setUp(*command.add_subcommand(std::string(row.name), std::string(row.summary)), action);
+  }
+}
+
+}  // namespace tenter::app

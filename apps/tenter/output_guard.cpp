@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "output_guard.h"
+
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "tenter/mechanics/material.h"
+
+namespace tenter::app {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* kAdvice = "choose another name, or remove it";
+
+std::string beginningOf(const fs::path& file) {
+  constexpr std::streamsize kLimit = 1 << 20;
+  std::ifstream in(file, std::ios::binary);
+  std::string text(static_cast<std::size_t>(kLimit), '\0');
+  in.read(text.data(), kLimit);
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text;
+}
+
+/// True where a file may be put without asking what is in it.
+Result<bool> isFree(const fs::path& file) {
+  std::error_code error;
+  if (file.filename().empty()) return usageError("'" + file.string() + "' is not a file name");
+  const auto status = fs::status(file, error);
+  if (!fs::exists(status)) return true;
+  if (!fs::is_regular_file(status)) {
+    return badInput(file.string(), "", "exists and is not a file", kAdvice);
+  }
+  return fs::file_size(file, error) == 0;
+}
+
+Error notOurs(const fs::path& path) {
+  return badInput(path.string(), "", "exists and was not written by tenter", kAdvice);
+}
+
+}  // namespace
+
+Result<void> checkOutputFile(const fs::path& file, std::string_view marker) {
+  const auto free = isFree(file);
+  if (!free.ok()) return free.error();
+  if (*free || beginningOf(file).find(marker) != std::string::npos) return {};
+  return notOurs(file);
+}
+
+Result<void> checkMaterialOutput(const fs::path& file) {
+  const auto free = isFree(file);
+  if (!free.ok()) return free.error();
+  if (*free || readMaterial(file).ok()) return {};
+  return notOurs(file);
+}
+
+Result<void> checkOutputFolder(const fs::path& folder, std::string_view marker) {
+  std::error_code error;
+  const auto status = fs::status(folder, error);
+  if (!fs::exists(status)) return {};
+  if (!fs::is_directory(status)) {
+    return badInput(folder.string(), "", "exists and is not a folder", kAdvice);
+  }
+  if (fs::is_empty(folder, error) || fs::exists(folder / marker, error)) return {};
+  return notOurs(folder);
+}
+
+}  // namespace tenter::app

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "interrupt.h"
+#include "output_guard.h"
+#include "progress.h"
+#include "tenter/core/mesh_io.h"
+#include "tenter/mechanics/equilibrium.h"
+#include "verbs.h"
+#include "vertex_selection.h"
+
+namespace tenter::app {
+
+namespace {
+
+constexpr std::string_view kOutputMarker = "\"displacement_m\"";
+
+struct Options {
+  std::string mesh, material, output, gravity = "0,0,-9.80665";
+  std::vector<std::string> fix;
+  double rho = 0.0, k_stretch = 0.0, k_bend = 0.0, tolerance_N = 0.0, time_budget_s = 0.0;
+  CLI::Option *rho_option = nullptr, *stretch_option = nullptr, *bend_option = nullptr;
+  int max_iterations = 500;
+};
+
+void declare(CLI::App& command, Options& o) {
+  command.add_option("mesh", o.mesh, "Sheet at rest: OBJ, PLY or VTP [m]")->required();
+  command.add_option("--material", o.material, "Material file");
+  o.rho_option = command.add_option("--rho", o.rho,
+                                    "Areal density [kg/m^2]; with --k-stretch and "
+                                    "--k-bend instead of a material");
+  o.stretch_option =
+      command.add_option("--k-stretch", o.k_stretch, "Stretching constant of [Inv18] eq. 9 [N/m]");
+  o.bend_option =
+      command.add_option("--k-bend", o.k_bend, "Bending constant of [Inv18] eq. 10 [N m]");
+  command
+      .add_option("--fix", o.fix,
+                  "Vertices that stay: 0,99 (from 0), 4-17, box:x0,y0,z0,x1,y1,z1 [m]")
+      ->allow_extra_args(false);
+  command.add_option("--gravity", o.gravity, "x,y,z [m/s^2]")->capture_default_str();
+  command.add_option("--tolerance-N", o.tolerance_N,
+                     "Largest force left on a degree of freedom; 0: 1e-4 of the lightest node");
+  command.add_option("--max-iterations", o.max_iterations, "Most Newton steps")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command.add_option("--time-budget", o.time_budget_s, "Most seconds; 0: no limit")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("-o,--output", o.output, "Draped sheet to write (VTP)")->required();
+}
+
+bool positive(double value) { return std::isfinite(value) && value > 0.0; }
+
+/// The two constants of [Inv18] as a material, so that both ways go on together.
+Result<Material> twoConstants(const Options& o) {
+  if (!positive(o.rho) || !positive(o.k_stretch) || !std::isfinite(o.k_bend) || o.k_bend < 0.0) {
+    return usageError("--rho and --k-stretch must be positive, --k-bend not negative");
+  }
+  Material material;
+  material.law = "edge-hinge";
+  material.areal_density_kg_per_m2 = o.rho;
+  const auto add = [&](const char* name, double value) {
+    MaterialComponent component;
+    component.name = name;
+    component.curve = StiffnessCurve::constant(value);
+    material.components.push_back(std::move(component));
+  };
+  add("edge_stretch", o.k_stretch);
+  add("hinge_bend", o.k_bend);
+  return material;
+}
+
+Result<Material> materialOf(const Options& o) {
+  const int given = static_cast<int>(o.rho_option->count() > 0) +
+                    static_cast<int>(o.stretch_option->count() > 0) +
+                    static_cast<int>(o.bend_option->count() > 0);
+  if (o.material.empty() ? given != 3 : given != 0) {
+    return usageError("give either --material, or all of --rho, --k-stretch and --k-bend");
+  }
+  if (o.material.empty()) return twoConstants(o);
+  auto material = readMaterial(o.material);
+  if (material.ok() && material->areal_density_kg_per_m2 <= 0.0) {
+    return badInput(o.material, "areal_density_kg_per_m2", "is missing, so the sheet has no weight",
+                    "write it into the material");
+  }
+  return material;
+}
+
+Result<ClothSystem> systemOf(const Options& o) {
+  const auto gravity = parseNumbers(o.gravity, 3, "--gravity");
+  if (!gravity) return gravity.error();
+  const auto material = materialOf(o);
+  if (!material) return material.error();
+  const auto model = findClothModel(material->law);
+  if (!model) {
+    return badInput(o.material, "law", "is " + material->law + ", which cannot be simulated here");
+  }
+  const auto laws = makeLaws(**model, *material);
+  if (!laws) return laws.error().in(o.material);
+  const auto file = readMesh(o.mesh);
+  if (!file) return file.error();
+  if (auto valid = validateMesh(file->mesh); !valid) return valid.error().in(o.mesh);
+  if (o.fix.empty()) {
+    return usageError("a free sheet has no equilibrium under gravity: it falls",
+                      "hold vertices with --fix, for example --fix 0,1");
+  }
+  SystemSetup setup;
+  auto fixed = selectVertices(o.fix, file->mesh);
+  if (!fixed) return fixed.error();
+  setup.fixed_nodes = std::move(fixed).value();
+  setup.areal_density_kg_per_m2 = material->areal_density_kg_per_m2;
+  setup.gravity_m_per_s2 = Vec3((*gravity)[0], (*gravity)[1], (*gravity)[2]);
+  const bool isotropic = (*model)->membrane == MembraneElement::kEdges;
+  auto sheet = sheetFromMesh(file->mesh, isotropic);
+  if (!sheet) return sheet.error().in(o.mesh);
+  auto system = ClothSystem::create(std::move(sheet).value(), **model, *laws, std::move(setup));
+  if (!system) return system.error().file.empty() ? system.error().in(o.mesh) : system.error();
+  return system;
+}
+
+/// Green strain (E_uu, E_vv, 2 E_uv) of every triangle.
+Eigen::MatrixXd greenStrains(const SheetMesh& sheet, const Points3& x) {
+  Eigen::MatrixXd strains(3, sheet.triangleCount());
+  for (int t = 0; t < sheet.triangleCount(); ++t) {
+    const Triangle& ids = sheet.rest.triangles[static_cast<std::size_t>(t)];
+    Eigen::Matrix<double, 3, 2> edges;
+    edges << x.col(ids[1]) - x.col(ids[0]), x.col(ids[2]) - x.col(ids[0]);
+    const Eigen::Matrix<double, 3, 2> f =
+        edges * sheet.triangles[static_cast<std::size_t>(t)].edges_inverse;
+    const Mat2 c = f.transpose() * f;
+    strains.col(t) << 0.5 * (c(0, 0) - 1.0), 0.5 * (c(1, 1) - 1.0), c(0, 1);
+  }
+  return strains;
+}
+
+Result<void> writeDraped(const std::string& file, const ClothSystem& system,
+                         const ClothState& state) {
+  const SheetMesh& sheet = system.sheet();
+  TriangleMesh draped = sheet.rest;
+  draped.positions = state.positions(sheet.nodeCount());
+  MeshData data;
+  data.point["displacement_m"] = draped.positions - sheet.rest.positions;
+  Eigen::MatrixXd fixed = Eigen::MatrixXd::Zero(1, sheet.nodeCount());
+  for (const int node : system.setup().fixed_nodes) fixed(0, node) = 1.0;
+  data.point["fixed"] = fixed;
+  data.cell["green_strain"] = greenStrains(sheet, draped.positions);
+  return writeVtp(file, draped, data);
+}
+
+EquilibriumOptions solverOptions(const Options& o, Progress& progress) {
+  EquilibriumOptions options;
+  options.max_iterations = o.max_iterations;
+  options.force_tolerance_N = o.tolerance_N;
+  options.compute_lambda_min = true;
+  options.time_budget_s = o.time_budget_s;
+  options.cancelled = interrupted;
+  options.progress = [&progress](int iteration, double residual_N) {
+    char text[96];
+    std::snprintf(text, sizeof text, "iteration %d, residual %.3g N", iteration, residual_N);
+    spdlog::info("{}", text);
+    progress.show(-1.0, text);
+  };
+  return options;
+}
+
+void tell(const Options& o, const EquilibriumSummary& s, bool converged, Console& console) {
+  console.answer = {{"converged", converged},
+                    {"stable", s.stable},
+                    {"termination", describe(s.termination)},
+                    {"iterations", s.newton_steps},
+                    {"factorizations", s.factorizations},
+                    {"residual_N", s.residual_N},
+                    {"lambda_min_per_s2", s.lambda_min_per_s2},
+                    {"lambda_min_residual_per_s2", s.lambda_min_residual_per_s2},
+                    {"seconds", s.seconds},
+                    {"energy_J", s.energy_J},
+                    {"file", o.output}};
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "%s: residual %.3g N after %d Newton steps, smallest eigenvalue %.4g 1/s^2, %.2f s",
+                o.output.c_str(), s.residual_N, s.newton_steps, s.lambda_min_per_s2, s.seconds);
+  console.say(text);
+}
+
+Result<int> run(const Options& o, Console& console) {
+  if (auto free = checkOutputFile(o.output, kOutputMarker); !free) return free.error();
+  if (!std::isfinite(o.tolerance_N) || o.tolerance_N < 0.0) {
+    return usageError("--tolerance-N must not be negative");
+  }
+  auto system = systemOf(o);
+  if (!system) return system.error();
+  ClothState state = system->restState();
+  EquilibriumSolver solver(*system);
+  EquilibriumSummary summary;
+  {
+    Progress progress(console);
+    summary = solver.solve(state, solverOptions(o, progress));
+  }
+  if (auto done = writeDraped(o.output, *system, state); !done) return done.error();
+  const bool converged = summary.converged() && summary.stable;
+  tell(o, summary, converged, console);
+  if (converged) return kDone;
+  console.warn("not an equilibrium (" + describe(summary.termination) +
+               "); the best so far is in " + o.output);
+  return static_cast<int>(ErrorKind::kNotConverged);
+}
+
+}  // namespace
+
+Verb drapeVerb() {
+  return {"drape", "Find the shape in which a sheet hangs",
+          [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declare, run); }};
+}
+
+}  // namespace tenter::app

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <array>
+#include <cstdio>
+
+#include "interrupt.h"
+#include "output_guard.h"
+#include "progress.h"
+#include "tenter/twin/capture.h"
+#include "verbs.h"
+
+namespace tenter::app {
+
+namespace {
+
+struct NoOptions {};
+
+void declareNothing(CLI::App& /*command*/, NoOptions& /*options*/) {}
+
+Result<int> listFabrics(const NoOptions& /*options*/, Console& console) {
+  auto& rows = console.answer["fabrics"] = nlohmann::json::array();
+  for (const Fabric& fabric : fabrics()) {
+    rows.push_back({{"id", fabric.id},
+                    {"description", fabric.description},
+                    {"areal_density_kg_per_m2", fabric.areal_density_kg_per_m2},
+                    {"thickness_m", fabric.thickness_m}});
+    console.say(std::string(fabric.id));
+  }
+  return kDone;
+}
+
+struct CaptureCommand {
+  CaptureOptions capture;
+  std::string noise = "on", scatter = "on", friction = "on", diagonals = "uniform";
+  bool measurement = false;
+  std::string output, truth;
+};
+
+void declareCapture(CLI::App& command, CaptureCommand& o) {
+  const CLI::IsMember on_off({"on", "off"});
+  command.add_option("--fabric", o.capture.fabric, "One of `tenter twin fabrics`")->required();
+  command.add_option("--protocol", o.capture.protocol, "One of `tenter protocol list`")->required();
+  command.add_flag("--measurement", o.measurement, "Write a measurement, the input of a fit")
+      ->required();
+  command.add_option("-o,--output", o.output, "Folder of the measurement")->required();
+  command.add_option("--truth", o.truth, "Folder for what a fit must not know");
+  command.add_option("--seed", o.capture.seed, "Of noise and of the specimen")
+      ->capture_default_str();
+  command.add_option("--specimen", o.capture.specimen, "Number of the piece; 0: as the seed")
+      ->capture_default_str();
+  command.add_option("--nodes", o.capture.nodes, "Nodes a side of the simulated sheet")
+      ->capture_default_str();
+  command.add_option("--frames", o.capture.frames, "Frames")->capture_default_str();
+  command.add_option("--tracked", o.capture.tracked, "Tracked vertices a side")
+      ->capture_default_str();
+  command.add_option("--noise", o.noise, "Noise of cameras, poses and load cells")
+      ->check(on_off)
+      ->capture_default_str();
+  command.add_option("--scatter", o.scatter, "Whether specimens differ from the nominal fabric")
+      ->check(on_off)
+      ->capture_default_str();
+  command.add_option("--friction", o.friction, "Internal friction of the cloth, and of the cords")
+      ->check(on_off)
+      ->capture_default_str();
+  command.add_option("--diagonals", o.diagonals, "Diagonals of the simulated sheet")
+      ->check(CLI::IsMember({"uniform", "alternating"}))
+      ->capture_default_str();
+}
+
+Result<int> capture(const CaptureCommand& command, Console& console) {
+  if (auto free = checkOutputFolder(command.output, kMeasurementMarker); !free) return free.error();
+  if (!command.truth.empty()) {
+    if (command.truth == command.output) {
+      return usageError("--truth must be another folder than -o");
+    }
+    if (auto free = checkOutputFolder(command.truth, "truth.json"); !free) return free.error();
+  }
+  CaptureOptions options = command.capture;
+  options.noise = command.noise == "on";
+  options.scatter = command.scatter == "on";
+  options.friction = options.cord_friction = command.friction == "on";
+  options.diagonals =
+      command.diagonals == "uniform" ? DiagonalPattern::kUniform : DiagonalPattern::kAlternating;
+  options.cancelled = interrupted;
+  Progress progress(console);
+  options.progress = [&](int done, int all) {
+    progress.show(
+        static_cast<double>(done) / std::max(all, 1),
+        options.protocol + ", frame " + std::to_string(done) + " of " + std::to_string(all));
+  };
+  const auto captured = captureMeasurement(options);
+  if (!captured) return captured.error();
+  if (auto done = writeMeasurement(command.output, captured->measurement); !done) {
+    return done.error();
+  }
+  if (!command.truth.empty()) {
+    if (auto done = writeTruth(command.truth, captured->truth); !done) return done.error();
+  }
+  const auto& statistics = captured->statistics;
+  console.answer = {{"measurement", command.output},
+                    {"fabric", options.fabric},
+                    {"protocol", options.protocol},
+                    {"frames", captured->measurement.frames.size()},
+                    {"newton_steps", statistics.newton_steps},
+                    {"factorizations", statistics.factorizations},
+                    {"largest_residual_N", statistics.largest_residual_N},
+                    {"seconds", statistics.seconds}};
+  console.say(command.output + ": " + std::to_string(captured->measurement.frames.size()) +
+              " frames of " + options.protocol);
+  return kDone;
+}
+
+}  // namespace
+
+Verb twinVerb() {
+  static constexpr std::array kRows = {
+      Verb{"fabrics", "Names of the virtual fabrics",
+           [](CLI::App& c, Action& a) {
+             setUpCommand<NoOptions>(c, a, declareNothing, listFabrics);
+           }},
+      Verb{"capture", "Simulate a protocol and write what a rig would have measured",
+           [](CLI::App& c, Action& a) {
+             setUpCommand<CaptureCommand>(c, a, declareCapture, capture);
+           }}};
+  return {"twin", "The virtual rig", [](CLI::App& command, Action& action) {
+            command.require_subcommand(1);
+            addSubcommands(command, kRows, action);
+          }};
+}
+
+}  // namespace tenter::app

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "verbs.h"
+
+#include <array>
+
+namespace tenter::app {
+
+std::span<const Verb> verbs() {
+  static const std::array kVerbs = {
+      importVerb(), fitVerb(),  evaluateVerb(), materialVerb(), exportVerb(),
+      drapeVerb(),  twinVerb(), protocolVerb(), versionVerb(),
+  };
+  return kVerbs;
+}
+
+}  // namespace tenter::app

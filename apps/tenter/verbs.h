@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include "command.h"
+
+namespace tenter::app {
+
+// One file each, verb_<name>.cpp.
+Verb importVerb();
+Verb fitVerb();
+Verb evaluateVerb();
+Verb materialVerb();
+Verb exportVerb();
+Verb drapeVerb();
+Verb twinVerb();
+Verb protocolVerb();
+Verb versionVerb();
+
+// Kinds of import, one file each, import_<name>.cpp.
+Verb tensileImport();
+Verb cantileverImport();
+Verb arcsimImport();
+Verb kesImport();
+
+}  // namespace tenter::app
