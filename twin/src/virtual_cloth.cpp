@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "virtual_cloth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "rig_setup.h"
+
+namespace tenter {
+
+Result<ClothSource> makeClothSource(const Fabric& specimen, const std::optional<OwnLaw>& own_law) {
+  ClothSource out;
+  const auto model = findClothModel(own_law ? own_law->model : "stvk");
+  if (!model) return model.error();
+  out.model = *model;
+  if (!own_law) {
+    out.membrane = std::make_shared<SpecimenMembraneLaw>(specimen.membrane);
+    out.bending = std::make_shared<SpecimenBendingLaw>(specimen.bending);
+    return out;
+  }
+  require(static_cast<int>(own_law->components.size()) == out.model->componentCount(),
+          "CaptureOptions::own_law: one curve a component of the model");
+  const ClothLaws laws = makeLaws(*out.model, own_law->components);
+  out.membrane = laws.membrane;
+  out.bending = laws.bending;
+  out.own = true;
+  return out;
+}
+
+Vec2 materialPoint(Vec2 place, bool on_bias) {
+  if (!on_bias) return place;
+  constexpr double kHalfRoot = 0.5 * std::numbers::sqrt2;
+  return {kHalfRoot * (place.x() - place.y()), kHalfRoot * (place.x() + place.y())};
+}
+
+SheetMesh sampleSheet(GridLines lines, bool on_bias) {
+  SheetMesh sheet = gridSheet(std::move(lines));
+  if (!on_bias) return sheet;
+  for (int n = 0; n < sheet.nodeCount(); ++n) {
+    sheet.rest.uv.col(n) = materialPoint(sheet.rest.positions.col(n).head<2>(), true);
+  }
+  for (int t = 0; t < sheet.triangleCount(); ++t) {
+    const Triangle& ids = sheet.rest.triangles[t];
+    Mat2 edges;
+    edges << sheet.rest.uv.col(ids[1]) - sheet.rest.uv.col(ids[0]),
+        sheet.rest.uv.col(ids[2]) - sheet.rest.uv.col(ids[0]);
+    sheet.triangles[t].edges_inverse = edges.inverse();
+  }
+  sheet.grid.reset();
+  sheet.pattern += " on the bias";
+  return sheet;
+}
+
+Eigen::Matrix3Xd greenStrains(const SheetMesh& sheet, const Eigen::Ref<const Points3>& positions) {
+  Eigen::Matrix3Xd out(3, sheet.triangleCount());
+  for (int t = 0; t < sheet.triangleCount(); ++t) {
+    const Triangle& ids = sheet.rest.triangles[t];
+    Eigen::Matrix<double, 3, 2> edges;
+    edges << positions.col(ids[1]) - positions.col(ids[0]),
+        positions.col(ids[2]) - positions.col(ids[0]);
+    const Eigen::Matrix<double, 3, 2> w = edges * sheet.triangles[t].edges_inverse;
+    out.col(t) << 0.5 * (w.col(0).squaredNorm() - 1.0), 0.5 * (w.col(1).squaredNorm() - 1.0),
+        w.col(0).dot(w.col(1));
+  }
+  return out;
+}
+
+TriangleMesh trackedMesh(int per_side, bool on_bias) {
+  return sampleSheet({linesThrough(0.0, kSampleSide_m, per_side, {}),
+                      linesThrough(0.0, kSampleSide_m, per_side, {}), DiagonalPattern::kUniform},
+                     on_bias)
+      .rest;
+}
+
+void count(const EquilibriumSummary& summary, CaptureStatistics& statistics) {
+  statistics.newton_steps += summary.newton_steps;
+  statistics.factorizations += summary.factorizations;
+  statistics.largest_residual_N = std::max(statistics.largest_residual_N, summary.residual_N);
+}
+
+}  // namespace tenter
