@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the cloth does to its clips, and how that changes with the material and with the clips' poses.
+// What the cloth does to its clips, and how that changes with the material and with the clips'
+// poses.
 #include "cloth_system_impl.h"
 
 namespace tenter {
@@ -18,7 +19,8 @@ void ClothSystem::Impl::ensureExact(const ClothSystem& system, const ClothState&
   exact_at = state.q;
 }
 
-Eigen::Matrix<double, 3, 6> ClothSystem::Impl::poseJacobian(const ClothState& state, int node) const {
+Eigen::Matrix<double, 3, 6> ClothSystem::Impl::poseJacobian(const ClothState& state,
+                                                            int node) const {
   return rigidJacobian(state.q.segment<3>(3 * node));
 }
 
@@ -38,27 +40,32 @@ Wrench ClothSystem::clipWrench(const ClothState& state, int clip) const {
 
 void ClothSystem::gradientByParameter(const ClothState& state, Eigen::MatrixXd& derivative) const {
   const DofMap& map = impl_->map;
-  Eigen::MatrixXd by_coordinate = Eigen::MatrixXd::Zero(map.coordinateCount(), impl_->parameter_count);
+  Eigen::MatrixXd by_coordinate =
+      Eigen::MatrixXd::Zero(map.coordinateCount(), impl_->parameter_count);
   for (std::size_t t = 0; t < impl_->terms.size(); ++t) {
     const int count = impl_->terms[t]->parameterCount();
     if (count > 0) {
-      impl_->terms[t]->addParameterGradient(state.q, by_coordinate.middleCols(impl_->parameter_offset[t], count));
+      impl_->terms[t]->addParameterGradient(
+          state.q, by_coordinate.middleCols(impl_->parameter_offset[t], count));
     }
   }
   derivative.setZero(map.dof_count, impl_->parameter_count);
   for (int i = 0; i < map.node_count; ++i) {
     if (map.node_dof[i] >= 0) {
-      derivative.middleRows(map.node_dof[i], map.dofs_per_node) = by_coordinate.middleRows(3 * i, map.dofs_per_node);
+      derivative.middleRows(map.node_dof[i], map.dofs_per_node) =
+          by_coordinate.middleRows(3 * i, map.dofs_per_node);
     }
   }
-  derivative.middleRows(map.rotation_dof, map.rotation_count) = by_coordinate.bottomRows(map.rotation_count);
+  derivative.middleRows(map.rotation_dof, map.rotation_count) =
+      by_coordinate.bottomRows(map.rotation_count);
   impl_->updateFrames(state);
   for (std::size_t c = 0; c < map.clip_dof.size(); ++c) {
     if (map.clip_dof[c] < 0) continue;
     for (int n : impl_->setup.clips[c].nodes) {
       const Vec3 arm = state.q.segment<3>(3 * n) - impl_->frames.pivot[c];
       derivative.middleRows<6>(map.clip_dof[c]) +=
-          clipJacobian(arm, impl_->frames.rotation_scale_m[c]).transpose() * by_coordinate.middleRows<3>(3 * n);
+          clipJacobian(arm, impl_->frames.rotation_scale_m[c]).transpose() *
+          by_coordinate.middleRows<3>(3 * n);
     }
   }
 }
@@ -66,13 +73,15 @@ void ClothSystem::gradientByParameter(const ClothState& state, Eigen::MatrixXd& 
 Eigen::MatrixXd ClothSystem::clipWrenchByParameter(const ClothState& state, int clip,
                                                    const Eigen::MatrixXd& dofs_by_parameter) const {
   const ClipSetup& c = impl_->setup.clips[clip];
-  require(!c.free, "clipWrenchByParameter: clip " + c.id + " is free: its wrench is given by its cords");
+  require(!c.free,
+          "clipWrenchByParameter: clip " + c.id + " is free: its wrench is given by its cords");
   impl_->ensureExact(*this, state);
   Eigen::MatrixXd by_coordinate = Eigen::MatrixXd::Zero(coordinateCount(), impl_->parameter_count);
   for (std::size_t t = 0; t < impl_->terms.size(); ++t) {
     const int count = impl_->terms[t]->parameterCount();
     if (count > 0) {
-      impl_->terms[t]->addParameterGradient(state.q, by_coordinate.middleCols(impl_->parameter_offset[t], count));
+      impl_->terms[t]->addParameterGradient(
+          state.q, by_coordinate.middleCols(impl_->parameter_offset[t], count));
     }
   }
   const auto& held = impl_->assembler->held();
@@ -82,7 +91,8 @@ Eigen::MatrixXd ClothSystem::clipWrenchByParameter(const ClothState& state, int 
     Eigen::MatrixXd force_derivative = -by_coordinate.middleRows<3>(3 * n);
     for (int i = 0; i < 3; ++i) {
       for (HessianAssembler::HeldMatrix::InnerIterator it(held, row + i); it; ++it) {
-        if (it.col() < impl_->map.dof_count) force_derivative.row(i) -= it.value() * dofs_by_parameter.row(it.col());
+        if (it.col() < impl_->map.dof_count)
+          force_derivative.row(i) -= it.value() * dofs_by_parameter.row(it.col());
       }
     }
     result += impl_->poseJacobian(state, n).transpose() * force_derivative;
@@ -99,7 +109,8 @@ Eigen::MatrixXd ClothSystem::gradientByPose(const ClothState& state, int clip) c
   for (int n : c.nodes) {
     const auto j = impl_->poseJacobian(state, n);
     for (int i = 0; i < 3; ++i) {
-      for (HessianAssembler::HeldMatrix::InnerIterator it(held, impl_->map.node_held[n] + i); it; ++it) {
+      for (HessianAssembler::HeldMatrix::InnerIterator it(held, impl_->map.node_held[n] + i); it;
+           ++it) {
         if (it.col() < impl_->map.dof_count) result.row(it.col()) += it.value() * j.row(i);
       }
     }
@@ -117,7 +128,8 @@ Eigen::MatrixXd ClothSystem::clipWrenchByPose(const ClothState& state, int clip,
   for (int n : impl_->setup.clips[clip].nodes) {
     Eigen::MatrixXd force_derivative = Eigen::MatrixXd::Zero(3, 6);
     for (int i = 0; i < 3; ++i) {
-      for (HessianAssembler::HeldMatrix::InnerIterator it(held, impl_->map.node_held[n] + i); it; ++it) {
+      for (HessianAssembler::HeldMatrix::InnerIterator it(held, impl_->map.node_held[n] + i); it;
+           ++it) {
         if (it.col() < dof_count) {
           force_derivative.row(i) -= it.value() * dofs_by_pose.row(it.col());
           continue;
@@ -125,7 +137,8 @@ Eigen::MatrixXd ClothSystem::clipWrenchByPose(const ClothState& state, int clip,
         const int coordinate = static_cast<int>(it.col()) - dof_count;
         const int other = impl_->map.held_nodes[coordinate / 3];
         if (impl_->map.node_clip[other] != moved_clip) continue;
-        force_derivative.row(i) -= it.value() * impl_->poseJacobian(state, other).row(coordinate % 3);
+        force_derivative.row(i) -=
+            it.value() * impl_->poseJacobian(state, other).row(coordinate % 3);
       }
     }
     result += impl_->poseJacobian(state, n).transpose() * force_derivative;
@@ -147,7 +160,8 @@ Eigen::MatrixXd ClothSystem::positionsByDof(const ClothState& state,
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(3 * map.node_count, dofs_by_parameter.cols());
   for (int i = 0; i < map.node_count; ++i) {
     if (map.node_dof[i] >= 0) {
-      result.middleRows(3 * i, map.dofs_per_node) = dofs_by_parameter.middleRows(map.node_dof[i], map.dofs_per_node);
+      result.middleRows(3 * i, map.dofs_per_node) =
+          dofs_by_parameter.middleRows(map.node_dof[i], map.dofs_per_node);
     } else if (map.onFreeClip(i)) {
       const int clip = map.node_clip[i];
       const Vec3 arm = state.q.segment<3>(3 * i) - impl_->frames.pivot[clip];

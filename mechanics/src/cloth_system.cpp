@@ -20,7 +20,8 @@ Result<std::vector<bool>> rigidTriangles(const SheetMesh& sheet, const SystemSet
   auto map = DofMap::create(sheet.nodeCount(), 0, setup);
   if (!map) return map.error();
   std::vector<bool> rigid(sheet.triangleCount());
-  for (int f = 0; f < sheet.triangleCount(); ++f) rigid[f] = heldByOneSupport(*map, sheet.rest.triangles[f]);
+  for (int f = 0; f < sheet.triangleCount(); ++f)
+    rigid[f] = heldByOneSupport(*map, sheet.rest.triangles[f]);
   return rigid;
 }
 
@@ -45,7 +46,8 @@ Mat3 cordHessian(const ElasticCord& cord, const Vec3& from_pulley) {
 
 }  // namespace
 
-ClothSystem::Impl::Impl(SheetMesh sheet_mesh, ClothTerms cloth_terms, SystemSetup system_setup, DofMap dof_map)
+ClothSystem::Impl::Impl(SheetMesh sheet_mesh, ClothTerms cloth_terms, SystemSetup system_setup,
+                        DofMap dof_map)
     : sheet(std::move(sheet_mesh)),
       setup(std::move(system_setup)),
       map(std::move(dof_map)),
@@ -67,7 +69,8 @@ ClothSystem::Impl::Impl(SheetMesh sheet_mesh, ClothTerms cloth_terms, SystemSetu
       centre.setZero();
       for (int n : clip.nodes) centre += sheet.rest.positions.col(n);
       centre /= static_cast<double>(clip.nodes.size());
-      for (int n : clip.nodes) radius = std::max(radius, (sheet.rest.positions.col(n) - centre).norm());
+      for (int n : clip.nodes)
+        radius = std::max(radius, (sheet.rest.positions.col(n) - centre).norm());
     }
     pivot_local.push_back(centre);
     frames.pivot.push_back(centre);
@@ -76,7 +79,8 @@ ClothSystem::Impl::Impl(SheetMesh sheet_mesh, ClothTerms cloth_terms, SystemSetu
 }
 
 void ClothSystem::Impl::updateFrames(const ClothState& state) const {
-  for (std::size_t c = 0; c < setup.clips.size(); ++c) frames.pivot[c] = state.clips[c] * pivot_local[c];
+  for (std::size_t c = 0; c < setup.clips.size(); ++c)
+    frames.pivot[c] = state.clips[c] * pivot_local[c];
 }
 
 void ClothSystem::Impl::coordinateGradient(const Eigen::VectorXd& q) const {
@@ -103,13 +107,16 @@ template <class Visitor>
 void ClothSystem::Impl::forEachClipPoint(const ClothState& state, int c, Visitor visit) const {
   const ClipSetup& clip = setup.clips[c];
   const Eigen::Isometry3d& pose = state.clips[c];
-  visit(Vec3(pose * clip.centre_of_mass_m), Vec3(-clip.mass_kg * setup.gravity_m_per_s2), Mat3(Mat3::Zero()));
-  for (const ClipForce& f : clip.forces) visit(Vec3(pose * f.attachment_m), Vec3(-f.force_N), Mat3(Mat3::Zero()));
+  visit(Vec3(pose * clip.centre_of_mass_m), Vec3(-clip.mass_kg * setup.gravity_m_per_s2),
+        Mat3(Mat3::Zero()));
+  for (const ClipForce& f : clip.forces)
+    visit(Vec3(pose * f.attachment_m), Vec3(-f.force_N), Mat3(Mat3::Zero()));
   for (const ElasticCord& cord : clip.cords) {
     const Vec3 place = pose * cord.attachment_m;
     const Vec3 from_pulley = place - cord.pulley_m;
     const double length = from_pulley.norm();
-    visit(place, Vec3(tension(cord, length) / length * from_pulley), cordHessian(cord, from_pulley));
+    visit(place, Vec3(tension(cord, length) / length * from_pulley),
+          cordHessian(cord, from_pulley));
   }
 }
 
@@ -117,7 +124,8 @@ void ClothSystem::Impl::reduceGradient(const ClothState& state, Eigen::VectorXd&
   dofs.setZero(map.dof_count);
   for (int i = 0; i < map.node_count; ++i) {
     if (map.node_dof[i] >= 0) {
-      dofs.segment(map.node_dof[i], map.dofs_per_node) = gradient_q.segment(3 * i, map.dofs_per_node);
+      dofs.segment(map.node_dof[i], map.dofs_per_node) =
+          gradient_q.segment(3 * i, map.dofs_per_node);
     }
   }
   dofs.segment(map.rotation_dof, map.rotation_count) = gradient_q.tail(map.rotation_count);
@@ -129,7 +137,8 @@ void ClothSystem::Impl::reduceGradient(const ClothState& state, Eigen::VectorXd&
       out.tail<3>() += (place - frames.pivot[c]).cross(g) / frames.rotation_scale_m[c];
     };
     for (int n : setup.clips[c].nodes) add(state.q.segment<3>(3 * n), gradient_q.segment<3>(3 * n));
-    forEachClipPoint(state, static_cast<int>(c), [&](const Vec3& p, const Vec3& g, const Mat3&) { add(p, g); });
+    forEachClipPoint(state, static_cast<int>(c),
+                     [&](const Vec3& p, const Vec3& g, const Mat3&) { add(p, g); });
   }
 }
 
@@ -143,20 +152,21 @@ void ClothSystem::Impl::addClipHessians(const ClothState& state, Projection proj
       const Vec3 arm = state.q.segment<3>(3 * n) - frames.pivot[c];
       geometric += rotationGeometricHessian(gradient_q.segment<3>(3 * n), arm, scale);
     }
-    forEachClipPoint(state, static_cast<int>(c), [&](const Vec3& place, const Vec3& g, const Mat3& h) {
-      const Vec3 arm = place - frames.pivot[c];
-      const auto j = clipJacobian(arm, scale);
-      block += j.transpose() * h * j;
-      geometric += rotationGeometricHessian(g, arm, scale);
-    });
+    forEachClipPoint(state, static_cast<int>(c),
+                     [&](const Vec3& place, const Vec3& g, const Mat3& h) {
+                       const Vec3 arm = place - frames.pivot[c];
+                       const auto j = clipJacobian(arm, scale);
+                       block += j.transpose() * h * j;
+                       geometric += rotationGeometricHessian(g, arm, scale);
+                     });
     if (projection == Projection::kPositiveSemiDefinite) projectPositiveSemiDefinite(geometric);
     block.bottomRightCorner<3, 3>() += geometric;
     assembler->addClipBlock(static_cast<int>(c), block);
   }
 }
 
-Result<ClothSystem> ClothSystem::create(SheetMesh sheet, const ClothModel& model, const ClothLaws& laws,
-                                        SystemSetup setup) {
+Result<ClothSystem> ClothSystem::create(SheetMesh sheet, const ClothModel& model,
+                                        const ClothLaws& laws, SystemSetup setup) {
   auto rigid = rigidTriangles(sheet, setup);
   if (!rigid) return rigid.error();
   ClothLaws used = laws;
@@ -167,12 +177,14 @@ Result<ClothSystem> ClothSystem::create(SheetMesh sheet, const ClothModel& model
 }
 
 Result<ClothSystem> ClothSystem::create(SheetMesh sheet, ClothTerms terms, SystemSetup setup) {
-  if (setup.planar && std::any_of(setup.clips.begin(), setup.clips.end(), [](auto& c) { return c.free; })) {
+  if (setup.planar &&
+      std::any_of(setup.clips.begin(), setup.clips.end(), [](auto& c) { return c.free; })) {
     return badInput("", "supports", "a planar system cannot have free clips");
   }
   auto map = DofMap::create(sheet.nodeCount(), static_cast<int>(terms.rotation_edge.size()), setup);
   if (!map) return map.error();
-  return ClothSystem(std::make_unique<Impl>(std::move(sheet), std::move(terms), std::move(setup), std::move(*map)));
+  return ClothSystem(std::make_unique<Impl>(std::move(sheet), std::move(terms), std::move(setup),
+                                            std::move(*map)));
 }
 
 ClothSystem::ClothSystem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -195,7 +207,8 @@ ClothState ClothSystem::restState() const {
   return state;
 }
 
-void ClothSystem::setClipPose(ClothState& state, int clip, const Eigen::Isometry3d& rig_from_clip) const {
+void ClothSystem::setClipPose(ClothState& state, int clip,
+                              const Eigen::Isometry3d& rig_from_clip) const {
   state.clips[clip] = rig_from_clip;
   for (int n : impl_->setup.clips[clip].nodes) {
     state.q.segment<3>(3 * n) = rig_from_clip * Vec3(impl_->sheet.rest.positions.col(n));
@@ -203,7 +216,8 @@ void ClothSystem::setClipPose(ClothState& state, int clip, const Eigen::Isometry
 }
 
 void ClothSystem::setCordRestLength(int clip, int cord, double rest_length_m) {
-  require(rest_length_m > 0.0, "a cord's rest length must be positive, not " + std::to_string(rest_length_m));
+  require(rest_length_m > 0.0,
+          "a cord's rest length must be positive, not " + std::to_string(rest_length_m));
   impl_->setup.clips[clip].cords[cord].rest_length_m = rest_length_m;
 }
 
@@ -233,7 +247,8 @@ const SparseLower& ClothSystem::hessian(const ClothState& state, Projection proj
   impl_->updateFrames(state);
   impl_->assembler->assemble(state.q, impl_->frames, projection);
   impl_->exact_at.resize(0);
-  if (std::any_of(impl_->map.clip_dof.begin(), impl_->map.clip_dof.end(), [](int d) { return d >= 0; })) {
+  if (std::any_of(impl_->map.clip_dof.begin(), impl_->map.clip_dof.end(),
+                  [](int d) { return d >= 0; })) {
     impl_->coordinateGradient(state.q);
     impl_->addClipHessians(state, projection);
   }
@@ -244,7 +259,8 @@ void ClothSystem::advance(ClothState& state, const Eigen::VectorXd& step, double
   const DofMap& map = impl_->map;
   for (int i = 0; i < map.node_count; ++i) {
     if (map.node_dof[i] < 0) continue;
-    state.q.segment(3 * i, map.dofs_per_node) += scale * step.segment(map.node_dof[i], map.dofs_per_node);
+    state.q.segment(3 * i, map.dofs_per_node) +=
+        scale * step.segment(map.node_dof[i], map.dofs_per_node);
   }
   state.q.tail(map.rotation_count) += scale * step.segment(map.rotation_dof, map.rotation_count);
   for (std::size_t c = 0; c < map.clip_dof.size(); ++c) {
@@ -253,7 +269,8 @@ void ClothSystem::advance(ClothState& state, const Eigen::VectorXd& step, double
     const Vec3 w = scale * step.segment<3>(map.clip_dof[c] + 3) / impl_->frames.rotation_scale_m[c];
     const Vec3 pivot = state.clips[c] * impl_->pivot_local[c];
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    if (w.norm() > 0.0) pose.linear() = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
+    if (w.norm() > 0.0)
+      pose.linear() = Eigen::AngleAxisd(w.norm(), w.normalized()).toRotationMatrix();
     pose.translation() = pivot + dt - pose.linear() * pivot;
     pose = pose * state.clips[c];
     // Many small steps must not let the rotation drift away from orthonormal.
@@ -266,7 +283,8 @@ Eigen::VectorXd ClothSystem::dofMass() const {
   const DofMap& map = impl_->map;
   Eigen::VectorXd mass = Eigen::VectorXd::Zero(map.dof_count);
   for (int i = 0; i < map.node_count; ++i) {
-    if (map.node_dof[i] >= 0) mass.segment(map.node_dof[i], map.dofs_per_node).setConstant(impl_->nodal_mass[i]);
+    if (map.node_dof[i] >= 0)
+      mass.segment(map.node_dof[i], map.dofs_per_node).setConstant(impl_->nodal_mass[i]);
   }
   for (std::size_t c = 0; c < map.clip_dof.size(); ++c) {
     if (map.clip_dof[c] < 0) continue;

@@ -41,7 +41,8 @@ struct ClothSystem::Impl {
   std::vector<Vec3> pivot_local;
   mutable ClipFrames frames;
   mutable Eigen::VectorXd gradient_q;
-  mutable Eigen::VectorXd exact_at;  ///< Coordinates at which the assembled Hessian is exact; empty if it is not.
+  mutable Eigen::VectorXd
+      exact_at;  ///< Coordinates at which the assembled Hessian is exact; empty if it is not.
   std::unique_ptr<HessianAssembler> assembler;
 };
 

@@ -33,6 +33,7 @@ Result<ClothTerms> makeClothTerms(const ClothModel& model, const ClothLaws& laws
   }
   ClothTerms out;
   out.terms.push_back(makeMembrane(model, laws, sheet, rigid_triangles));
+  if (!laws.bending) return out;  // in-plane
   switch (model.bending) {
     case BendingElement::kSprings:
       out.terms.push_back(makeRing2SpringTerm(sheet, laws.bending));

@@ -17,9 +17,11 @@ Result<DofMap> DofMap::create(int node_count, int rotation_count, const SystemSe
   std::vector<int> support(node_count, kFree);
   const auto claim = [&](int node, int by) -> Result<void> {
     if (node < 0 || node >= node_count) {
-      return supportError(node, "held, but the mesh has nodes 0 to " + std::to_string(node_count - 1));
+      return supportError(node,
+                          "held, but the mesh has nodes 0 to " + std::to_string(node_count - 1));
     }
-    if (support[node] != kFree && support[node] != by) return supportError(node, "held by two supports");
+    if (support[node] != kFree && support[node] != by)
+      return supportError(node, "held by two supports");
     support[node] = by;
     return {};
   };
@@ -60,7 +62,8 @@ Result<DofMap> DofMap::create(int node_count, int rotation_count, const SystemSe
     next += 6;
   }
   map.dof_count = next;
-  if (next == 0) return badInput("", "supports", "every node is held: nothing is left to solve for");
+  if (next == 0)
+    return badInput("", "supports", "every node is held: nothing is left to solve for");
   return map;
 }
 

@@ -13,7 +13,8 @@ namespace tenter {
 namespace {
 
 constexpr double kForceToleranceOfNodeWeight = 1e-4;
-/// Forces are resolved to this many roundings of the positions, times the stiffest degree of freedom.
+/// Forces are resolved to this many roundings of the positions, times the stiffest degree of
+/// freedom.
 constexpr double kRoundings = 8.0;
 constexpr double kArmijo = 1e-4;
 constexpr int kMaxBacktracks = 40;
@@ -46,13 +47,14 @@ struct EquilibriumSolver::Impl {
   bool lineSearch(ClothState& state, double& energy);
   bool leaveSaddle(ClothState& state, double& energy);
   void measureStability(const ClothState& state, EquilibriumSummary& summary);
-  Termination iterate(ClothState& state, const EquilibriumOptions& options, EquilibriumSummary& summary,
-                      Clock::time_point start);
+  Termination iterate(ClothState& state, const EquilibriumOptions& options,
+                      EquilibriumSummary& summary, Clock::time_point start);
 };
 
-/// step = -H^-1 g with the exact Hessian if it is positive definite, else with the projected one, shifted if need be.
-/// Returns whether the exact one served.
-bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state, EquilibriumSummary& summary) {
+/// step = -H^-1 g with the exact Hessian if it is positive definite, else with the projected one,
+/// shifted if need be. Returns whether the exact one served.
+bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state,
+                                              EquilibriumSummary& summary) {
   ++summary.factorizations;
   if (cholesky.factorize(system.hessian(state, Projection::kNone))) {
     cholesky.solve(g, step);
@@ -81,10 +83,12 @@ double EquilibriumSolver::Impl::roundingOfForces(const ClothState& state) const 
   const SparseLower& h = system.hessian(state, Projection::kNone);
   double stiffest = 0.0;
   for (int c = 0; c < h.size; ++c) stiffest = std::max(stiffest, h.value[h.column_begin[c]]);
-  return kRoundings * std::numeric_limits<double>::epsilon() * stiffest * state.q.cwiseAbs().maxCoeff();
+  return kRoundings * std::numeric_limits<double>::epsilon() * stiffest *
+         state.q.cwiseAbs().maxCoeff();
 }
 
-/// Backtracks until the energy falls enough or, where rounding hides the energy's change, until the residual falls.
+/// Backtracks until the energy falls enough or, where rounding hides the energy's change, until the
+/// residual falls.
 bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
   const double slope = g.dot(step);
   const double size = state.q.cwiseAbs().maxCoeff();
@@ -150,7 +154,8 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
   for (int k = 0;; ++k) {
     summary.residual_N = residual(g);
     summary.energy_J = energy;
-    if (!std::isfinite(summary.residual_N) || !std::isfinite(energy)) return Termination::kNotFinite;
+    if (!std::isfinite(summary.residual_N) || !std::isfinite(energy))
+      return Termination::kNotFinite;
     if (options.progress) options.progress(k, summary.residual_N);
     const bool small = summary.residual_N <= tolerance;
     if (small && !options.leave_saddles) return Termination::kConverged;
@@ -163,13 +168,15 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
     if (small) {
       ++summary.factorizations;
       summary.stable = cholesky.factorize(system.hessian(state, Projection::kNone));
-      if (summary.stable || ++saddles > kMaxSaddles || !leaveSaddle(state, energy)) return Termination::kConverged;
+      if (summary.stable || ++saddles > kMaxSaddles || !leaveSaddle(state, energy))
+        return Termination::kConverged;
       continue;
     }
     const bool exact = newtonDirection(state, summary);
     ++summary.newton_steps;
     if (lineSearch(state, energy)) continue;
-    // At the limit of rounding no step can show progress: that is convergence if forces are at that limit too.
+    // At the limit of rounding no step can show progress: that is convergence if forces are at that
+    // limit too.
     if (exact && summary.residual_N <= std::max(tolerance, roundingOfForces(state))) {
       summary.stable = true;
       return Termination::kConverged;
@@ -179,7 +186,8 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
   }
 }
 
-void EquilibriumSolver::Impl::measureStability(const ClothState& state, EquilibriumSummary& summary) {
+void EquilibriumSolver::Impl::measureStability(const ClothState& state,
+                                               EquilibriumSummary& summary) {
   const SparseLower& h = system.hessian(state, Projection::kNone);
   const SmallestEigenvalue pair = smallestEigenvalue(h, mass, cholesky);
   summary.lambda_min_per_s2 = pair.value;
@@ -187,14 +195,16 @@ void EquilibriumSolver::Impl::measureStability(const ClothState& state, Equilibr
   summary.stable = pair.positive_definite;
 }
 
-EquilibriumSolver::EquilibriumSolver(const ClothSystem& system) : impl_(std::make_unique<Impl>(system)) {}
+EquilibriumSolver::EquilibriumSolver(const ClothSystem& system)
+    : impl_(std::make_unique<Impl>(system)) {}
 EquilibriumSolver::EquilibriumSolver(EquilibriumSolver&&) noexcept = default;
 EquilibriumSolver::~EquilibriumSolver() = default;
 
 EquilibriumSummary EquilibriumSolver::solve(ClothState& state, const EquilibriumOptions& options) {
   const auto start = Clock::now();
   EquilibriumSummary summary;
-  summary.lambda_min_per_s2 = summary.lambda_min_residual_per_s2 = std::numeric_limits<double>::quiet_NaN();
+  summary.lambda_min_per_s2 = summary.lambda_min_residual_per_s2 =
+      std::numeric_limits<double>::quiet_NaN();
   const ClothState before = state;
   summary.termination = impl_->iterate(state, options, summary, start);
   if (summary.converged()) {
@@ -214,16 +224,24 @@ bool EquilibriumSolver::factorize(const ClothState& state) {
   return impl_->cholesky.factorize(impl_->system.hessian(state, Projection::kNone));
 }
 
-Eigen::MatrixXd EquilibriumSolver::solveLinear(const Eigen::MatrixXd& rhs) { return impl_->cholesky.solve(rhs); }
+Eigen::MatrixXd EquilibriumSolver::solveLinear(const Eigen::MatrixXd& rhs) {
+  return impl_->cholesky.solve(rhs);
+}
 
 std::string describe(Termination termination) {
   switch (termination) {
-    case Termination::kConverged: return "converged";
-    case Termination::kIterationLimit: return "iteration limit reached";
-    case Termination::kLineSearchFailed: return "no step lowers the energy";
-    case Termination::kTimeBudget: return "time budget used up";
-    case Termination::kCancelled: return "cancelled";
-    case Termination::kNotFinite: return "energy or forces are not finite";
+    case Termination::kConverged:
+      return "converged";
+    case Termination::kIterationLimit:
+      return "iteration limit reached";
+    case Termination::kLineSearchFailed:
+      return "no step lowers the energy";
+    case Termination::kTimeBudget:
+      return "time budget used up";
+    case Termination::kCancelled:
+      return "cancelled";
+    case Termination::kNotFinite:
+      return "energy or forces are not finite";
   }
   return "unknown";
 }

@@ -16,7 +16,8 @@ void sortUnique(std::vector<int>& v) {
 /// Receives one term's elements in order and scatters them.
 class HessianAssembler::Sink final : public HessianSink {
  public:
-  Sink(HessianAssembler& owner, std::size_t term, const Eigen::VectorXd& q, const ClipFrames& frames)
+  Sink(HessianAssembler& owner, std::size_t term, const Eigen::VectorXd& q,
+       const ClipFrames& frames)
       : owner_(owner), term_(term), q_(q), frames_(frames) {}
 
   void add(int element, const double* block) override {
@@ -69,7 +70,8 @@ class HessianAssembler::Sink final : public HessianSink {
   std::array<double, kMaxLocal * kMaxLocal> local_;
 };
 
-HessianAssembler::HessianAssembler(const DofMap& map, const std::vector<std::unique_ptr<EnergyTerm>>& terms)
+HessianAssembler::HessianAssembler(const DofMap& map,
+                                   const std::vector<std::unique_ptr<EnergyTerm>>& terms)
     : map_(map), terms_(terms), plans_(terms.size()) {
   std::vector<std::vector<int>> free_rows(map.dof_count), held_columns(map.heldCount());
   for (int d = 0; d < map.dof_count; ++d) free_rows[d].push_back(d);
@@ -79,7 +81,8 @@ HessianAssembler::HessianAssembler(const DofMap& map, const std::vector<std::uni
     }
   }
   for (const auto& term : terms) {
-    for (const Stencil& s : term->stencils()) collectPattern(entitiesOf(s, nullptr), free_rows, held_columns);
+    for (const Stencil& s : term->stencils())
+      collectPattern(entitiesOf(s, nullptr), free_rows, held_columns);
   }
 
   matrix_.size = map.dof_count;
@@ -121,7 +124,8 @@ HessianAssembler::HessianAssembler(const DofMap& map, const std::vector<std::uni
   }
 }
 
-std::vector<HessianAssembler::Entity> HessianAssembler::entitiesOf(const Stencil& s, Transform* transform) const {
+std::vector<HessianAssembler::Entity> HessianAssembler::entitiesOf(const Stencil& s,
+                                                                   Transform* transform) const {
   const bool on_clip = std::any_of(s.nodes.begin(), s.nodes.begin() + s.node_count,
                                    [&](int n) { return map_.onFreeClip(n); });
   std::vector<Entity> entities;
@@ -133,7 +137,8 @@ std::vector<HessianAssembler::Entity> HessianAssembler::entitiesOf(const Stencil
     const int node = s.nodes[k];
     if (on_clip && map_.onFreeClip(node)) {
       const int clip = map_.node_clip[node];
-      auto known = std::find_if(clips.begin(), clips.end(), [&](auto& c) { return c.first == clip; });
+      auto known =
+          std::find_if(clips.begin(), clips.end(), [&](auto& c) { return c.first == clip; });
       if (known == clips.end()) {
         entities.push_back({map_.clip_dof[clip], -1, 6, local});
         known = clips.insert(clips.end(), {clip, local});
@@ -178,15 +183,19 @@ void HessianAssembler::collectPattern(const std::vector<Entity>& entities,
   }
 }
 
-void HessianAssembler::planElement(const std::vector<Entity>& entities, int local_size, ElementPlan& plan) {
-  const auto source = [&](int row, int column) { return static_cast<std::uint16_t>(column * local_size + row); };
+void HessianAssembler::planElement(const std::vector<Entity>& entities, int local_size,
+                                   ElementPlan& plan) {
+  const auto source = [&](int row, int column) {
+    return static_cast<std::uint16_t>(column * local_size + row);
+  };
   plan.free_begin = static_cast<int>(runs_.size());
   for (const Entity& a : entities) {
     for (const Entity& b : entities) {
       if (a.first_held >= 0 || b.first_held >= 0 || a.first_dof < b.first_dof) continue;
       for (int j = 0; j < b.size; ++j) {
         const int skip = a.first_dof == b.first_dof ? j : 0;  // lower triangle only
-        runs_.push_back({freePosition(a.first_dof + skip, b.first_dof + j), source(a.local + skip, b.local + j),
+        runs_.push_back({freePosition(a.first_dof + skip, b.first_dof + j),
+                         source(a.local + skip, b.local + j),
                          static_cast<std::uint16_t>(a.size - skip)});
       }
     }
@@ -218,7 +227,8 @@ int HessianAssembler::heldPosition(int row, int column) const {
   return static_cast<int>(std::lower_bound(begin, end, column) - held_.innerIndexPtr());
 }
 
-void HessianAssembler::assemble(const Eigen::VectorXd& q, const ClipFrames& frames, Projection projection) {
+void HessianAssembler::assemble(const Eigen::VectorXd& q, const ClipFrames& frames,
+                                Projection projection) {
   std::fill(matrix_.value.begin(), matrix_.value.end(), 0.0);
   std::fill_n(held_.valuePtr(), held_.nonZeros(), 0.0);
   for (std::size_t t = 0; t < terms_.size(); ++t) {

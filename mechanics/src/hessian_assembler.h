@@ -11,8 +11,9 @@
 
 namespace tenter {
 
-/// Scatters element Hessians into the sparse matrix of the degrees of freedom, and into the rows of the held
-/// coordinates (which give the clips' stiffness). The pattern and every element's places in it are worked out once.
+/// Scatters element Hessians into the sparse matrix of the degrees of freedom, and into the rows of
+/// the held coordinates (which give the clips' stiffness). The pattern and every element's places
+/// in it are worked out once.
 class HessianAssembler {
  public:
   /// Rows: held coordinates; columns: dofs, then held coordinates.

@@ -16,7 +16,8 @@ constexpr double kRelativeResidual = 1e-4;
 constexpr unsigned kSeed = 20260101;
 
 /// Smallest shift (by doubling) that makes H + shift M positive definite; 0 if H is.
-double shiftToDefinite(const SparseLower& h, const Eigen::VectorXd& mass, SparseCholesky& cholesky) {
+double shiftToDefinite(const SparseLower& h, const Eigen::VectorXd& mass,
+                       SparseCholesky& cholesky) {
   if (cholesky.factorize(h)) return 0.0;
   double scale = 0.0;
   for (int c = 0; c < h.size; ++c) {
@@ -30,7 +31,8 @@ double shiftToDefinite(const SparseLower& h, const Eigen::VectorXd& mass, Sparse
 
 }  // namespace
 
-SmallestEigenvalue smallestEigenvalue(const SparseLower& h, const Eigen::VectorXd& mass, SparseCholesky& cholesky) {
+SmallestEigenvalue smallestEigenvalue(const SparseLower& h, const Eigen::VectorXd& mass,
+                                      SparseCholesky& cholesky) {
   SmallestEigenvalue best;
   const double shift = shiftToDefinite(h, mass, cholesky);
   best.positive_definite = shift == 0.0;
@@ -45,7 +47,8 @@ SmallestEigenvalue smallestEigenvalue(const SparseLower& h, const Eigen::VectorX
   for (double& v : x.reshaped()) v = static_cast<double>(random()) / 4294967296.0 - 0.5;
 
   for (int k = 0; k < kMaxIterations; ++k) {
-    // (H + shift M) y = M x, so on span(y) the small problem (y'Mx) c = theta (y'My) c approximates the lowest eigenpairs.
+    // (H + shift M) y = M x, so on span(y) the small problem (y'Mx) c = theta (y'My) c approximates
+    // the lowest eigenpairs.
     const Eigen::MatrixXd mx = mass.asDiagonal() * x;
     Eigen::MatrixXd y = cholesky.solve(mx);
     const Eigen::MatrixXd stiffness = y.transpose() * mx;

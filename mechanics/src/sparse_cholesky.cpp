@@ -25,6 +25,7 @@ struct SparseCholesky::Impl {
       : column_begin(pattern.column_begin), row(pattern.row), value(pattern.row.size(), 0.0) {
     cholmod_start(&common);
     common.print = 0;
+    common.final_ll = 1;  // L D L' would accept negative pivots
     common.quick_return_if_not_posdef = 1;
     matrix.nrow = matrix.ncol = pattern.size;
     matrix.nzmax = row.size();
@@ -39,7 +40,8 @@ struct SparseCholesky::Impl {
     matrix.packed = 1;
     for (int c = 0; c < pattern.size; ++c) diagonal.push_back(column_begin[c]);
     factor = cholmod_analyze(&matrix, &common);
-    if (factor == nullptr) throw std::runtime_error("CHOLMOD could not analyse a matrix: out of memory");
+    if (factor == nullptr)
+      throw std::runtime_error("CHOLMOD could not analyse a matrix: out of memory");
   }
   ~Impl() {
     cholmod_free_dense(&solution, &common);
@@ -52,11 +54,13 @@ struct SparseCholesky::Impl {
   Impl& operator=(const Impl&) = delete;
 };
 
-SparseCholesky::SparseCholesky(const SparseLower& pattern) : impl_(std::make_unique<Impl>(pattern)) {}
+SparseCholesky::SparseCholesky(const SparseLower& pattern)
+    : impl_(std::make_unique<Impl>(pattern)) {}
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky::~SparseCholesky() = default;
 
-bool SparseCholesky::factorize(const SparseLower& matrix, double shift, const Eigen::VectorXd* weights) {
+bool SparseCholesky::factorize(const SparseLower& matrix, double shift,
+                               const Eigen::VectorXd* weights) {
   std::copy(matrix.value.begin(), matrix.value.end(), impl_->value.begin());
   if (shift != 0.0) {
     for (int c = 0; c < matrix.size; ++c) impl_->value[impl_->diagonal[c]] += shift * (*weights)[c];
@@ -77,18 +81,19 @@ Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& rhs) {
   b.x = const_cast<double*>(rhs.data());
   b.xtype = CHOLMOD_REAL;
   b.dtype = CHOLMOD_DOUBLE;
-  const int ok = cholmod_solve2(CHOLMOD_A, impl_->factor, &b, nullptr, &impl_->solution, nullptr, &impl_->work_y,
-                                &impl_->work_e, &impl_->common);
+  const int ok = cholmod_solve2(CHOLMOD_A, impl_->factor, &b, nullptr, &impl_->solution, nullptr,
+                                &impl_->work_y, &impl_->work_e, &impl_->common);
   if (!ok) throw std::runtime_error("CHOLMOD could not solve: out of memory");
-  return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(impl_->solution->x), rhs.rows(), rhs.cols());
+  return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(impl_->solution->x),
+                                           rhs.rows(), rhs.cols());
 }
 
 Eigen::VectorXd SparseCholesky::negativeDirection(const SparseLower& m) {
   using Sparse = Eigen::SparseMatrix<double>;
-  const Eigen::Map<const Sparse> lower(m.size, m.size, static_cast<int>(m.value.size()), m.column_begin.data(),
-                                       m.row.data(), m.value.data());
-  // Without pivoting, L D L' of an indefinite matrix exists but for zero pivots; a negative pivot j gives
-  // v = L^-T e_j with v' H v = d_j < 0.
+  const Eigen::Map<const Sparse> lower(m.size, m.size, static_cast<int>(m.value.size()),
+                                       m.column_begin.data(), m.row.data(), m.value.data());
+  // Without pivoting, L D L' of an indefinite matrix exists but for zero pivots; a negative pivot j
+  // gives v = L^-T e_j with v' H v = d_j < 0.
   Eigen::SimplicialLDLT<Sparse, Eigen::Lower> ldlt;
   ldlt.compute(lower);
   if (ldlt.info() != Eigen::Success) return {};

@@ -8,16 +8,18 @@
 
 namespace tenter {
 
-/// Cholesky factorisation of a sparse symmetric matrix whose pattern does not change (CHOLMOD): ordered and analysed
-/// once, factorised many times. Not safe to share between threads.
+/// Cholesky factorisation of a sparse symmetric matrix whose pattern does not change (CHOLMOD):
+/// ordered and analysed once, factorised many times. Not safe to share between threads.
 class SparseCholesky {
  public:
   explicit SparseCholesky(const SparseLower& pattern);
   SparseCholesky(SparseCholesky&&) noexcept;
   ~SparseCholesky();
 
-  /// Factorises matrix + shift * diag(weights); weights may be null when shift is 0. False when it is not positive definite.
-  bool factorize(const SparseLower& matrix, double shift = 0.0, const Eigen::VectorXd* weights = nullptr);
+  /// Factorises matrix + shift * diag(weights); weights may be null when shift is 0. False when it
+  /// is not positive definite.
+  bool factorize(const SparseLower& matrix, double shift = 0.0,
+                 const Eigen::VectorXd* weights = nullptr);
   /// Solves with the last successful factorisation.
   void solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x);
   Eigen::MatrixXd solve(const Eigen::MatrixXd& rhs);

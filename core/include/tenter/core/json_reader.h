@@ -70,8 +70,8 @@ class JsonReader {
   std::string placeOf(const std::string& key) const;
   JsonReader child(const nlohmann::json* value, const std::string& place);
   double checkedNumber(const nlohmann::json& value, const std::string& key, const Range& range);
-  std::int64_t checkedInteger(const nlohmann::json& value, const std::string& key,
-                              std::int64_t min, std::int64_t max);
+  std::int64_t checkedInteger(const nlohmann::json& value, const std::string& key, std::int64_t min,
+                              std::int64_t max);
   std::string checkedText(const nlohmann::json& value, const std::string& key,
                           std::size_t max_length);
 

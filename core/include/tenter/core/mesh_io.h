@@ -21,10 +21,10 @@ struct MeshFile {
   MeshData data;
 };
 
-/// Reads OBJ, PLY or VTP by extension [m]. Vertex ids are the file's own order. Polygons are split
-/// as fans. Material coordinates: `uv` point data in VTP; `s`,`t` or `u`,`v` in PLY; `vt` in OBJ,
-/// scaled by nothing. Error kBadInput with file, line or element and reason. Validation of the mesh
-/// itself is the caller's (validateMesh).
+/// Reads OBJ, PLY or VTP by extension [m]. Vertex ids are the file's own order; polygons become
+/// fans. Material coordinates [m]: `uv` point data in VTP; `u`,`v` or `s`,`t` in PLY; `vt` in OBJ.
+/// An OBJ with a seam (two `vt` on one vertex, or a vertex without one) yields a mesh without uv.
+/// Error kBadInput with file, line or element and reason. validateMesh is the caller's.
 Result<MeshFile> readMesh(const std::filesystem::path& file);
 
 /// Writes VTP (binary, zlib), atomically: the file is complete or absent.

@@ -11,34 +11,43 @@ namespace tenter {
 
 struct EquilibriumOptions {
   int max_iterations = 200;
-  /// Largest force on a degree of freedom at convergence [N]; 0: 1e-4 of the lightest free node's weight.
+  /// Largest force on a degree of freedom at convergence [N]; 0: 1e-4 of the lightest free node's
+  /// weight.
   double force_tolerance_N = 0.0;
   /// Leave a saddle along its negative direction and go on; otherwise it is only reported.
   bool leave_saddles = true;
   /// Compute the smallest eigenvalue of H v = lambda M v [1/s^2].
   bool compute_lambda_min = false;
-  double time_budget_s = 0.0;  ///< 0: none.
+  double time_budget_s = 0.0;       ///< 0: none.
   std::function<bool()> cancelled;  ///< Polled once an iteration.
   std::function<void(int iteration, double residual_N)> progress;
 };
 
-enum class Termination { kConverged, kIterationLimit, kLineSearchFailed, kTimeBudget, kCancelled, kNotFinite };
+enum class Termination {
+  kConverged,
+  kIterationLimit,
+  kLineSearchFailed,
+  kTimeBudget,
+  kCancelled,
+  kNotFinite
+};
 
 struct EquilibriumSummary {
   Termination termination = Termination::kIterationLimit;
-  bool stable = false;          ///< No negative pivot in the Hessian at the end.
+  bool stable = false;  ///< No negative pivot in the Hessian at the end.
   int newton_steps = 0;
   int factorizations = 0;
-  double residual_N = 0.0;      ///< Largest force on a degree of freedom.
+  double residual_N = 0.0;  ///< Largest force on a degree of freedom.
   double energy_J = 0.0;
-  double lambda_min_per_s2 = 0.0;  ///< NaN if not computed.
+  double lambda_min_per_s2 = 0.0;           ///< NaN if not computed.
   double lambda_min_residual_per_s2 = 0.0;  ///< Residual of that eigenpair.
   double seconds = 0.0;
   bool converged() const { return termination == Termination::kConverged; }
 };
 
-/// Newton's method on the energy with the exact Hessian; element-wise projection only when it is indefinite; sparse Cholesky
-/// analysed once per solver and reused. After a failed solve the state is the best so far, and the summary says why it failed.
+/// Newton's method on the energy with the exact Hessian; element-wise projection only when it is
+/// indefinite; sparse Cholesky analysed once per solver and reused. After a failed solve the state
+/// is the best so far, and the summary says why it failed.
 class EquilibriumSolver {
  public:
   explicit EquilibriumSolver(const ClothSystem& system);
