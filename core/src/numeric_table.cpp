@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <charconv>
 #include <cmath>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "tenter/core/files.h"
+#include "text_scan.h"
 
 namespace tenter {
 
@@ -36,17 +35,9 @@ std::vector<std::string_view> cellsOf(std::string_view line) {
   }
 }
 
-std::optional<double> numberIn(std::string_view cell) {
-  if (!cell.empty() && cell.front() == '+') cell.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (code != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
-  return value;
-}
-
 bool isHeader(const std::vector<std::string_view>& cells) {
   for (const std::string_view cell : cells) {
-    if (numberIn(cell)) return false;
+    if (parseNumber<double>(cell)) return false;
   }
   return true;
 }
@@ -62,7 +53,7 @@ Result<void> appendRow(const std::vector<std::string_view>& cells, int columns,
   }
   for (int column = 0; column < columns; ++column) {
     const std::string_view cell = cells[static_cast<std::size_t>(column)];
-    const auto value = numberIn(cell);
+    const auto value = parseNumber<double>(cell);
     const std::string place = line + ", column " + std::to_string(column + 1);
     if (!value) {
       return badInput(file, place, "\"" + std::string(cell.substr(0, 40)) + "\" is not a number",
