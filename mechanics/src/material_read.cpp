@@ -158,10 +158,13 @@ bool labelFits(const Material& material, const std::string& label) {
 
 void checkMatrix(JsonReader& in, const Eigen::MatrixXd& c) {
   for (int i = 0; i < c.rows(); ++i)
-    for (int j = 0; j <= i; ++j) {
+    if (c(i, i) < 0.0)
+      return in.fail("matrix[" + std::to_string(i) + "][" + std::to_string(i) + "]",
+                     "is a negative variance");
+  for (int i = 0; i < c.rows(); ++i)
+    for (int j = 0; j < i; ++j) {
       const double bound = std::sqrt(std::max(c(i, i), 0.0)) * std::sqrt(std::max(c(j, j), 0.0));
       const std::string place = "matrix[" + std::to_string(i) + "][" + std::to_string(j) + "]";
-      if (i == j && c(i, i) < 0.0) return in.fail(place, "is a negative variance");
       if (std::abs(c(i, j) - c(j, i)) > kCovarianceTolerance * bound)
         return in.fail(place, "differs from its mirror image");
       if (std::abs(c(i, j)) > (1.0 + kCovarianceTolerance) * bound)
@@ -224,8 +227,6 @@ Result<Material> materialFromJson(const Json& json, const std::string& file) {
   Material material = readHead(in);
   if (!in.ok()) return in.error();
   readComponents(in, material);
-  if (in.ok() && given(in, "covariance"))
-    material.covariance = readCovariance(in.object("covariance"), material);
   material.fit = freeForm(in, "fit");
   material.provenance = freeForm(in, "provenance");
   material.tables = freeForm(in, "tables");
@@ -239,6 +240,9 @@ Result<Material> materialFromJson(const Json& json, const std::string& file) {
     const Result<ClothLaws> laws = makeLaws(**findClothModel(material.law), material);
     if (!laws.ok()) return laws.error().in(file);
   }
+  if (in.ok() && given(in, "covariance"))
+    material.covariance = readCovariance(in.object("covariance"), material);
+  if (!in.ok()) return in.error();
   return material;
 }
 
