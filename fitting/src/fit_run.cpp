@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "initial_guess.h"
+
+namespace tenter {
+namespace {
+
+constexpr double kOutlierQuantile = 0.005;
+/// Frames a test in the stages before the last: enough for five knots, and three times fewer
+/// equilibria.
+constexpr int kEarlyFrames = 15;
+constexpr int kScanFrames = 4;
+/// Stages stop when the cost falls by less than 1 % ([Est12] sec. 5.1); the last pass goes on to
+/// where equilibria are noise.
+constexpr double kEarlyTolerance = 1e-2;
+constexpr double kFinalTolerance = 1e-9;
+constexpr int kEarlyIterations = 10;
+/// Ranges narrower than this share of their place hold one knot only.
+constexpr double kNarrowRange = 1e-6;
+/// Sum of squares per residual below which data are met to rounding and knots cannot help.
+constexpr double kNothingLeft = 1e-12;
+/// The golden ratio's fraction: its multiples spread over [0, 1) without rhythm.
+constexpr double kGolden = 0.6180339887498949;
+
+double quantile(const std::vector<std::pair<double, double>>& sorted, double total, double share) {
+  double sum = 0.0;
+  for (const auto& [strain, weight] : sorted) {
+    sum += weight;
+    if (sum >= share * total) return strain;
+  }
+  return sorted.back().first;
+}
+
+}  // namespace
+
+std::vector<double> equidistantKnots(double begin, double end, int count) {
+  if (count < 2) return {0.0};
+  std::vector<double> knots(count);
+  for (int i = 0; i < count; ++i)
+    knots[i] = i + 1 == count ? end : begin + (end - begin) * i / (count - 1);
+  return knots;
+}
+
+std::vector<int> spreadFrames(int frame_count, int wanted) {
+  std::vector<bool> chosen(frame_count, wanted <= 0 || wanted >= frame_count);
+  if (wanted > 0 && wanted < frame_count) {
+    int count = 0;
+    for (int i = 1; count < wanted; ++i) {
+      const int frame = static_cast<int>(std::fmod(kGolden * i, 1.0) * frame_count);
+      if (!chosen[frame]) ++count;
+      chosen[frame] = true;
+    }
+  }
+  std::vector<int> frames;
+  for (int i = 0; i < frame_count; ++i)
+    if (chosen[i]) frames.push_back(i);
+  return frames;
+}
+
+StrainRange strainRange(const std::vector<FitTest::StrainSamples>& samples, bool even) {
+  std::vector<std::pair<double, double>> sorted;
+  double total = 0.0;
+  for (const FitTest::StrainSamples& s : samples)
+    for (std::size_t i = 0; i < s.strain.size(); ++i) {
+      if (!std::isfinite(s.strain[i]) || !(s.weight[i] > 0.0)) continue;
+      sorted.emplace_back(even ? std::abs(s.strain[i]) : s.strain[i], s.weight[i]);
+      total += s.weight[i];
+    }
+  if (sorted.empty()) return {};
+  std::ranges::sort(sorted);
+  return {even ? 0.0 : quantile(sorted, total, kOutlierQuantile),
+          quantile(sorted, total, 1.0 - kOutlierQuantile)};
+}
+
+FitRun::FitRun(const ClothModel& model, std::vector<FitTest*> tests, const FitOptions& options)
+    : options_(options),
+      tests_(tests),
+      state_(makeFitState(model, options.variant)),
+      evaluator_(std::move(tests), options.threads, options.cancelled) {
+  for (const FitTest* test : tests_) roles_.push_back(testRole(*test, model));
+  tieUnseenDirections(state_, roles_);
+}
+
+std::vector<int> FitRun::allTests() const {
+  std::vector<int> all(tests_.size());
+  for (std::size_t t = 0; t < tests_.size(); ++t) all[t] = static_cast<int>(t);
+  return all;
+}
+
+std::vector<FrameId> FitRun::framesOf(const std::vector<int>& tests, int per_test) const {
+  std::vector<FrameId> frames;
+  for (const int t : tests)
+    for (const int f : spreadFrames(tests_[t]->frameCount(), per_test))
+      if (tests_[t]->residualCount(f) > 0) frames.push_back({t, f});
+  return frames;
+}
+
+void FitRun::reweigh(const std::vector<int>& tests) {
+  for (const int t : tests) tests_[t]->reweigh();
+}
+
+void FitRun::noteDropped(int dropped, const std::string& stage) {
+  if (dropped > 0)
+    warnings.push_back(std::to_string(dropped) +
+                       " frames have no stable equilibrium at the start of " + stage +
+                       " and were left out there");
+}
+
+bool FitRun::solve(const std::vector<int>& groups, const std::vector<int>& tests, int per_test,
+                   const OuterOptions& outer, const std::string& stage) {
+  for (const int g : groups) state_.updateReference(g);
+  const auto space = std::make_shared<FitSpace>(state_, groups);
+  evaluator_.configure(space, framesOf(tests, per_test));
+  const Eigen::VectorXd start = space->start();
+  noteDropped(evaluator_.dropFailing(start), stage);
+  if (evaluator_.frames().empty() || space->size() == 0) return false;
+  long residuals = 0;
+  for (const int t : tests) residuals += evaluator_.rawResidualCount(t);
+  OuterOptions with_progress = outer;
+  with_progress.progress = [&](int iteration, double cost) {
+    if (!options_.progress) return;
+    options_.progress(
+        {stage, iteration, cost, std::sqrt(2.0 * cost / static_cast<double>(residuals))});
+  };
+  last_ = solveOuter(evaluator_, start, with_progress);
+  outer_iterations += last_.iterations;
+  if (!last_.usable) return false;
+  state_ = space->stateAt(last_.z);
+  return true;
+}
+
+/// Tries decades around the guess on a few frames, each from the measured shape (nothing is
+/// accepted in between).
+void FitRun::scan(int group, const std::vector<int>& tests) {
+  const double guess = state_.groups[group].coefficients.mean();
+  const bool wide =
+      state_.groups[group].bending && state_.model->bending == BendingElement::kSprings;
+  const int decades = wide ? 3 : state_.groups[group].bending ? 2 : 1;
+  const int per_test = std::max(1, kScanFrames / static_cast<int>(tests.size()));
+  double best = guess, best_cost = std::numeric_limits<double>::infinity();
+  std::vector<double> factors{1.0};
+  for (int d = 1; d <= decades; ++d) {
+    factors.push_back(std::pow(10.0, d));
+    factors.push_back(std::pow(10.0, -d));
+  }
+  for (const double factor : factors) {
+    if (evaluator_.cancelled()) return;
+    state_.setConstant(group, factor * guess);
+    const auto space = std::make_shared<FitSpace>(state_, std::vector<int>{group});
+    evaluator_.configure(space, framesOf(tests, per_test));
+    if (!evaluator_.evaluate(space->start()) || evaluator_.cost() >= best_cost) continue;
+    best_cost = evaluator_.cost();
+    best = factor * guess;
+  }
+  state_.setConstant(group, best);
+  reweigh(tests);
+}
+
+const std::vector<double>* FitRun::givenKnots(int group) const {
+  for (const int c : state_.groups[group].members) {
+    const auto given = options_.knots.find(std::string(state_.model->component(c).name));
+    if (given != options_.knots.end()) return &given->second;
+  }
+  return nullptr;
+}
+
+StrainRange FitRun::rangeOf(int component, const std::vector<int>& tests) const {
+  std::vector<FitTest::StrainSamples> samples;
+  for (const int t : tests)
+    if (std::ranges::find(roles_[t].observed, component) != roles_[t].observed.end())
+      samples.push_back(tests_[t]->strainSamples(component));
+  return strainRange(samples, state_.model->component(component).even);
+}
+
+void FitRun::addKnots(int group, const std::vector<int>& tests, const OuterOptions& outer) {
+  const std::string name = state_.groupName(group);
+  if (const std::vector<double>* given = givenKnots(group)) {
+    state_.setKnots(group, *given);
+    solve({group}, tests, kEarlyFrames, outer, name);
+    return;
+  }
+  StrainRange range{std::numeric_limits<double>::infinity(),
+                    -std::numeric_limits<double>::infinity()};
+  for (int i = 0; i < state_.groups[group].assumed_from; ++i) {
+    const StrainRange r = rangeOf(state_.groups[group].members[i], tests);
+    range = {std::min(range.begin, r.begin), std::max(range.end, r.end)};
+  }
+  const double width = range.end - range.begin;
+  if (!(width > kNarrowRange * std::max(std::abs(range.begin), std::abs(range.end)))) return;
+  double cost = last_.cost;
+  for (int knots = 2; knots <= options_.max_knots && !evaluator_.cancelled(); ++knots) {
+    if (2.0 * cost < kNothingLeft * static_cast<double>(evaluator_.frames().size())) return;
+    const FitState before = state_;
+    state_.setKnots(group, equidistantKnots(range.begin, range.end, knots));
+    const bool better = solve({group}, tests, kEarlyFrames, outer, name) &&
+                        cost - last_.cost >= options_.knot_improvement * cost;
+    if (!better) {
+      state_ = before;
+      return;
+    }
+    cost = last_.cost;
+  }
+}
+
+void FitRun::fitGroup(int group) {
+  const std::vector<int> tests = testsOfGroup(state_, group, roles_);
+  const std::string name = state_.groupName(group);
+  const OuterOptions outer{
+      .relative_tolerance = kEarlyTolerance, .max_iterations = kEarlyIterations, .progress = {}};
+  scan(group, tests);
+  if (!solve({group}, tests, kEarlyFrames, outer, name)) return;
+  reweigh(tests);
+  if (!solve({group}, tests, kEarlyFrames, outer, name)) return;
+  if (!options_.variant.linear && !state_.groups[group].constant_only)
+    addKnots(group, tests, outer);
+}
+
+bool FitRun::refine() {
+  refined_ = seenGroups(state_, roles_);
+  if (refined_.empty() || evaluator_.cancelled()) return false;
+  const OuterOptions early{
+      .relative_tolerance = kEarlyTolerance, .max_iterations = kEarlyIterations, .progress = {}};
+  reweigh(allTests());
+  if (!solve(refined_, allTests(), kEarlyFrames, early, "refinement")) return false;
+  if (evaluator_.cancelled()) return true;
+  reweigh(allTests());
+  const OuterOptions tight{.relative_tolerance = kFinalTolerance,
+                           .max_iterations = options_.max_outer_iterations,
+                           .progress = {}};
+  if (!solve(refined_, allTests(), 0, tight, "all frames")) return false;
+  converged = last_.converged;
+  return true;
+}
+
+bool FitRun::run() {
+  std::vector<const Measurement*> measurements;
+  for (const FitTest* test : tests_) measurements.push_back(&test->measurement());
+  setInitialGuesses(state_, measurements, roles_, options_.test.nodes);
+  for (const int group : stageOrder(state_, roles_)) {
+    if (evaluator_.cancelled()) break;
+    if (!state_.groups[group].may_be_negative) fitGroup(group);
+  }
+  const bool refined = refine();
+  return refined || evaluator_.cancelled();
+}
+
+bool FitRun::settle() {
+  if (!last_.usable) return false;
+  const bool complete = !refined_.empty() && evaluator_.space().groups() == refined_;
+  if (!complete) {
+    refined_ = seenGroups(state_, roles_);
+    const auto space = std::make_shared<FitSpace>(state_, refined_);
+    evaluator_.configure(space, framesOf(allTests(), kEarlyFrames));
+    last_.z = space->start();
+    evaluator_.dropFailing(last_.z);
+  }
+  if (evaluator_.frames().empty() || !evaluator_.evaluate(last_.z, false)) return false;
+  evaluator_.accept();
+  return true;
+}
+
+bool FitRun::refit(FitState start, const std::vector<int>& groups, int max_iterations,
+                   double tolerance) {
+  state_ = std::move(start);
+  refined_ = groups;
+  const OuterOptions outer{
+      .relative_tolerance = tolerance, .max_iterations = max_iterations, .progress = {}};
+  if (!solve(refined_, allTests(), kEarlyFrames, outer, "alternative law")) return false;
+  converged = last_.converged;
+  return true;
+}
+
+}  // namespace tenter

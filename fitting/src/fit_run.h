@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fit_roles.h"
+#include "frame_evaluator.h"
+#include "outer_solver.h"
+#include "tenter/fitting/fit.h"
+
+namespace tenter {
+
+/// Knots at equal distances over a range; even curves begin at 0.
+std::vector<double> equidistantKnots(double begin, double end, int count);
+
+/// Frames spread over a test without a rhythm of their own, so that cycles of a protocol are not
+/// sampled at one phase.
+std::vector<int> spreadFrames(int frame_count, int wanted);
+
+struct StrainRange {
+  double begin = 0.0, end = 0.0;
+};
+/// Between the 0.5 % and 99.5 % weighted quantiles: the histogram without outliers ([Est12]
+/// sec. 5.2).
+StrainRange strainRange(const std::vector<FitTest::StrainSamples>& samples, bool even);
+
+/// One fit in progress: [Est12] sec. 5.2, generic in tests and model.
+class FitRun {
+ public:
+  FitRun(const ClothModel& model, std::vector<FitTest*> tests, const FitOptions& options);
+
+  /// Guess, a stage a group, then all together. False when not even a first equilibrium exists (see
+  /// `warnings`) or nothing was fitted.
+  bool run();
+  /// From a given state: no stages, only the groups named, all tests that see them, few iterations.
+  /// For alternatives of the law.
+  bool refit(FitState start, const std::vector<int>& groups, int max_iterations, double tolerance);
+
+  /// Brings the tests to the best point: of the last pass, or, if that never came, of everything
+  /// that the stages found.
+  bool settle();
+
+  const FitState& state() const { return state_; }
+  const std::vector<TestRole>& roles() const { return roles_; }
+  FrameEvaluator& evaluator() { return evaluator_; }
+  const std::vector<int>& refinedGroups() const { return refined_; }
+  const OuterSummary& last() const { return last_; }
+  StrainRange rangeOf(int component, const std::vector<int>& tests) const;
+
+  int outer_iterations = 0;
+  bool converged = false;
+  std::vector<std::string> warnings;
+
+ private:
+  std::vector<FrameId> framesOf(const std::vector<int>& tests, int per_test) const;
+  bool solve(const std::vector<int>& groups, const std::vector<int>& tests, int per_test,
+             const OuterOptions& outer, const std::string& stage);
+  void scan(int group, const std::vector<int>& tests);
+  void fitGroup(int group);
+  void addKnots(int group, const std::vector<int>& tests, const OuterOptions& outer);
+  const std::vector<double>* givenKnots(int group) const;
+  bool refine();
+  void reweigh(const std::vector<int>& tests);
+  void noteDropped(int dropped, const std::string& stage);
+  std::vector<int> allTests() const;
+
+  FitOptions options_;
+  std::vector<FitTest*> tests_;
+  std::vector<TestRole> roles_;
+  FitState state_;
+  FrameEvaluator evaluator_;
+  std::vector<int> refined_;
+  OuterSummary last_;
+};
+
+}  // namespace tenter

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fit_statistics.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "outer_solver.h"
+
+namespace tenter {
+namespace {
+
+/// Closer to its bound than this (in units of the group's typical stiffness) an entry rests on it.
+constexpr double kAtBound = 1e-9;
+/// A knot's relative error refers to at least this share of the curve's largest stiffness.
+constexpr double kSmallKnot = 0.05;
+/// Terms of a combination lighter than this are not listed.
+constexpr double kLightTerm = 0.1;
+constexpr double kPriorInformation = 1.0 / (kPriorRelativeStd * kPriorRelativeStd);
+
+std::vector<TestInformation> gather(const FrameEvaluator& evaluator) {
+  const int n = evaluator.space().size();
+  std::vector<TestInformation> tests(evaluator.tests().size());
+  for (std::size_t t = 0; t < tests.size(); ++t) {
+    tests[t].normal = Eigen::MatrixXd::Zero(n, n);
+    tests[t].gradient = Eigen::VectorXd::Zero(n);
+    tests[t].residuals = evaluator.rawResidualCount(static_cast<int>(t));
+  }
+  for (std::size_t i = 0; i < evaluator.frames().size(); ++i) {
+    const FrameBlock& block = evaluator.blocks()[i];
+    TestInformation& test = tests[evaluator.frames()[i].test];
+    test.normal.noalias() += block.jacobian.transpose() * block.jacobian;
+    test.gradient.noalias() += block.jacobian.transpose() * block.residuals;
+    test.chi2 += block.residuals.squaredNorm();
+  }
+  return tests;
+}
+
+std::vector<bool> entriesAtBound(const FitSpace& space, const Eigen::VectorXd& z) {
+  const Eigen::VectorXd lower = space.lowerBounds();
+  std::vector<bool> at_bound(z.size());
+  for (int i = 0; i < z.size(); ++i) at_bound[i] = z[i] - lower[i] <= kAtBound;
+  return at_bound;
+}
+
+/// Rows and columns of held entries out of the way: unit diagonal, which the caller strips again.
+Eigen::MatrixXd inverseOfFree(Eigen::MatrixXd information, const std::vector<bool>& held) {
+  const auto n = information.rows();
+  information.diagonal().array() += kPriorInformation;
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (held[i]) {
+      information.row(i).setZero();
+      information.col(i).setZero();
+      information(i, i) = 1.0;
+    }
+  Eigen::MatrixXd inverse = information.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (held[i]) inverse(i, i) = 0.0;
+  return inverse;
+}
+
+}  // namespace
+
+FitStatistics fitStatistics(const FrameEvaluator& evaluator, const Eigen::VectorXd& z) {
+  FitStatistics statistics;
+  statistics.tests = gather(evaluator);
+  statistics.at_bound = entriesAtBound(evaluator.space(), z);
+  const auto n = z.size();
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
+  for (const TestInformation& test : statistics.tests) information += test.normal;
+  const Eigen::MatrixXd inverse = inverseOfFree(information, statistics.at_bound);
+
+  Eigen::MatrixXd widened = kPriorInformation * Eigen::MatrixXd::Identity(n, n);
+  for (TestInformation& test : statistics.tests) {
+    const double taken = (inverse * test.normal).trace();
+    test.chi2_per_dof = test.chi2 / std::max(1.0, test.residuals - taken);
+    widened += std::max(1.0, test.chi2_per_dof) * test.normal;
+  }
+  statistics.covariance = inverse * widened * inverse;
+  return statistics;
+}
+
+KnotStatistics knotStatistics(const FitSpace& space, const Eigen::VectorXd& z,
+                              const Eigen::MatrixXd& covariance, int group) {
+  const ParameterGroup& g = space.state().groups[group];
+  const Eigen::MatrixXd map = g.reference * g.basis->knotValueMap();
+  const int begin = space.offset(group), count = g.basis->size();
+  KnotStatistics knots;
+  knots.value = map * z.segment(begin, count);
+  knots.std = (map * covariance.block(begin, begin, count, count) * map.transpose())
+                  .diagonal()
+                  .cwiseMax(0.0)
+                  .cwiseSqrt();
+  double floor = kSmallKnot * knots.value.cwiseAbs().maxCoeff();
+  // A coupling may well be 0: its error refers to what would matter.
+  if (g.may_be_negative) floor = std::max(floor, g.reference);
+  for (int i = 0; i < knots.value.size(); ++i)
+    knots.observed.push_back(knots.std[i] <=
+                             kSeenRelativeStd * std::max(floor, std::abs(knots.value[i])));
+  return knots;
+}
+
+nlohmann::json identifiabilityJson(const FitSpace& space, const FitStatistics& statistics) {
+  nlohmann::json json = {{"seen_relative_std", kSeenRelativeStd},
+                         {"scale", "coefficients relative to their curve's mean stiffness"},
+                         {"combinations", nlohmann::json::array()},
+                         {"at_bound", nlohmann::json::array()}};
+  std::vector<std::string> names;
+  std::vector<int> coefficients;
+  for (const int g : space.groups())
+    for (int j = 0; j < space.state().groups[g].basis->size(); ++j) {
+      names.push_back(space.state().groupName(g));
+      coefficients.push_back(j);
+    }
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(statistics.covariance);
+  for (int i = 0; i < space.size(); ++i) {
+    const Eigen::VectorXd direction = eigen.eigenvectors().col(i);
+    const double relative_std = std::sqrt(std::max(0.0, eigen.eigenvalues()[i]));
+    nlohmann::json terms = nlohmann::json::array();
+    bool held = false;
+    for (int j = 0; j < space.size(); ++j) {
+      if (std::abs(direction[j]) < kLightTerm) continue;
+      held = held || statistics.at_bound[j];
+      terms.push_back(
+          {{"component", names[j]}, {"coefficient", coefficients[j]}, {"weight", direction[j]}});
+    }
+    if (held && relative_std == 0.0) continue;
+    json["combinations"].push_back({{"relative_std", relative_std},
+                                    {"seen", relative_std <= kSeenRelativeStd},
+                                    {"terms", terms}});
+  }
+  for (int j = 0; j < space.size(); ++j)
+    if (statistics.at_bound[j])
+      json["at_bound"].push_back({{"component", names[j]}, {"coefficient", coefficients[j]}});
+  return json;
+}
+
+namespace {
+
+struct Specimen {
+  std::string name;
+  Eigen::VectorXd z;
+  Eigen::MatrixXd covariance;
+};
+
+/// Gauss-Newton from the common optimum with the specimen's own tests.
+std::vector<Specimen> specimenSteps(const FrameEvaluator& evaluator,
+                                    const FitStatistics& statistics, const Eigen::VectorXd& z) {
+  std::vector<std::string> names;
+  for (const FitTest* test : evaluator.tests()) names.push_back(test->measurement().specimen);
+  std::vector<std::string> unique = names;
+  std::ranges::sort(unique);
+  unique.erase(std::unique(unique.begin(), unique.end()), unique.end());
+  const Eigen::VectorXd lower = evaluator.space().lowerBounds();
+  std::vector<Specimen> specimens;
+  for (const std::string& name : unique) {
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(z.size(), z.size());
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(z.size());
+    for (std::size_t t = 0; t < names.size(); ++t) {
+      if (names[t] != name) continue;
+      const TestInformation& test = statistics.tests[t];
+      const double weight = 1.0 / std::max(1.0, test.chi2_per_dof);
+      normal += weight * test.normal;
+      gradient += weight * test.gradient;
+    }
+    Specimen specimen{name, z, inverseOfFree(normal, statistics.at_bound)};
+    specimen.z = (z - specimen.covariance * gradient).cwiseMax(lower);
+    specimens.push_back(std::move(specimen));
+  }
+  return specimens;
+}
+
+nlohmann::json scatterOfGroup(const FitSpace& space, const std::vector<Specimen>& specimens,
+                              int group) {
+  std::vector<KnotStatistics> each;
+  for (const Specimen& s : specimens)
+    each.push_back(knotStatistics(space, s.z, s.covariance, group));
+  const std::vector<double>& strains = space.state().groups[group].basis->knots();
+  nlohmann::json knots = nlohmann::json::array();
+  for (std::size_t k = 0; k < strains.size(); ++k) {
+    nlohmann::json values = nlohmann::json::array();
+    double sum = 0.0, squares = 0.0;
+    int count = 0;
+    for (std::size_t s = 0; s < specimens.size(); ++s) {
+      const double value = each[s].value[static_cast<int>(k)];
+      if (!each[s].observed[k]) continue;
+      values.push_back({{"specimen", specimens[s].name},
+                        {"stiffness", value},
+                        {"std", each[s].std[static_cast<int>(k)]}});
+      sum += value;
+      squares += value * value;
+      ++count;
+    }
+    const double spread =
+        count < 2 ? 0.0 : std::max(0.0, squares - sum * sum / count) / (count - 1);
+    knots.push_back({{"strain", strains[k]},
+                     {"scatter", count < 2 ? nlohmann::json() : nlohmann::json(std::sqrt(spread))},
+                     {"values", values}});
+  }
+  return {{"component", space.state().groupName(group)}, {"knots", knots}};
+}
+
+}  // namespace
+
+nlohmann::json specimenJson(const FrameEvaluator& evaluator, const FitStatistics& statistics,
+                            const Eigen::VectorXd& z) {
+  const std::vector<Specimen> specimens = specimenSteps(evaluator, statistics, z);
+  if (specimens.size() < 2) return nullptr;
+  nlohmann::json json = {{"method", "one Gauss-Newton step a specimen from the common optimum"},
+                         {"names", nlohmann::json::array()},
+                         {"curves", nlohmann::json::array()}};
+  for (const Specimen& s : specimens) json["names"].push_back(s.name);
+  for (const int g : evaluator.space().groups())
+    json["curves"].push_back(scatterOfGroup(evaluator.space(), specimens, g));
+  return json;
+}
+
+}  // namespace tenter

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "frame_evaluator.h"
+
+namespace tenter {
+
+/// Relative standard deviation beyond which a knot or a combination of coefficients counts as not
+/// seen.
+inline constexpr double kSeenRelativeStd = 0.5;
+
+/// Variance of an entry of z (relative to its curve's mean stiffness) from which the weak belief
+/// says more than the data.
+inline constexpr double kUnseenCoefficientVariance = 0.5e6;
+
+/// Information of one test about z, and how well it is met.
+struct TestInformation {
+  Eigen::MatrixXd normal;    ///< Sum of J^T J.
+  Eigen::VectorXd gradient;  ///< Sum of J^T r.
+  double chi2 = 0.0;
+  double residuals = 0.0;  ///< Before compression.
+  double chi2_per_dof =
+      0.0;  ///< Degrees of freedom: residuals less what the parameters took up of them.
+};
+
+/// What the data say about z at the optimum (docs/fitting.md). Entries at their bound are held
+/// there.
+struct FitStatistics {
+  std::vector<TestInformation> tests;
+  std::vector<bool> at_bound;  ///< Of each entry of z.
+  Eigen::MatrixXd
+      covariance;  ///< Of z; zero at bounds. Misfit beyond the noise widens it, test by test.
+};
+
+/// Of the point that the evaluator evaluated last, with all its blocks valid.
+FitStatistics fitStatistics(const FrameEvaluator& evaluator, const Eigen::VectorXd& z);
+
+/// Knot values of a group (in the first member's units), their standard deviations, and whether
+/// they are seen.
+struct KnotStatistics {
+  Eigen::VectorXd value, std;
+  std::vector<bool> observed;
+};
+/// @param covariance  of z, as FitStatistics has it.
+KnotStatistics knotStatistics(const FitSpace& space, const Eigen::VectorXd& z,
+                              const Eigen::MatrixXd& covariance, int group);
+
+/// material.fit["identifiability"]: combinations of coefficients with their relative standard
+/// deviation, seen or not.
+nlohmann::json identifiabilityJson(const FitSpace& space, const FitStatistics& statistics);
+
+/// material.fit["specimens"]: one linearised step a specimen from the common optimum, and the
+/// scatter between them; null for one specimen.
+nlohmann::json specimenJson(const FrameEvaluator& evaluator, const FitStatistics& statistics,
+                            const Eigen::VectorXd& z);
+
+}  // namespace tenter

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+
+#include "frame_evaluator.h"
+
+namespace tenter {
+
+/// Weak belief that keeps what the data cannot see finite: every coefficient within
+/// kPriorRelativeStd of the group's typical stiffness of where it started, and curves as smooth
+/// ([Est12] has none). Residuals are `matrix` z - `offset`.
+struct Prior {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd offset;
+};
+inline constexpr double kPriorRelativeStd = 1000.0;
+Prior weakPrior(const FitSpace& space, const Eigen::VectorXd& around);
+
+struct OuterOptions {
+  double relative_tolerance =
+      1e-2;  ///< Stop when the cost falls by less between iterations ([Est12] sec. 5.1).
+  int max_iterations = 30;
+  std::function<void(int iteration, double cost)> progress;
+};
+
+struct OuterSummary {
+  Eigen::VectorXd z;  ///< Best point, also when cancelled or not converged.
+  double initial_cost = 0.0;
+  double cost = 0.0;  ///< Of the data, half the sum of squares.
+  int iterations = 0;
+  int failed_points = 0;  ///< Trial points where a frame had no equilibrium.
+  bool converged = false;
+  bool usable = false;  ///< False when not even the start could be evaluated.
+};
+
+/// min over z >= bounds of the sum of squares of the evaluator's frames, by Ceres' trust region
+/// (Levenberg-Marquardt). On return the evaluator's accepted states are those of the best point.
+OuterSummary solveOuter(FrameEvaluator& evaluator, const Eigen::VectorXd& start,
+                        const OuterOptions& options);
+
+}  // namespace tenter
