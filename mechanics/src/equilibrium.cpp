@@ -19,6 +19,7 @@ constexpr double kRoundings = 8.0;
 constexpr double kArmijo = 1e-4;
 constexpr int kMaxBacktracks = 40;
 constexpr int kMaxSaddles = 20;
+constexpr int kWatchdog = 4;
 
 using Clock = std::chrono::steady_clock;
 
@@ -39,12 +40,20 @@ struct EquilibriumSolver::Impl {
   Eigen::VectorXd mass, shift_weights;
   Eigen::VectorXd g, trial_g, step;
   ClothState trial;
-  double damping = 0.0;  ///< Of the last indefinite step; warm start for the next.
+  /// Last state from which the energy has to fall, and the Newton step there (watchdog).
+  struct Reference {
+    ClothState state;
+    double energy = 0.0;
+    Eigen::VectorXd g, step;
+    int steps_since = 0;
+  } reference;
 
   double roundingOfForces(const ClothState& state) const;
   double residual(const Eigen::VectorXd& gradient) const { return gradient.cwiseAbs().maxCoeff(); }
   bool newtonDirection(const ClothState& state, EquilibriumSummary& summary);
+  double fullStep(const ClothState& state) const;
   bool lineSearch(ClothState& state, double& energy);
+  bool tryFullStep(ClothState& state, double& energy);
   bool leaveSaddle(ClothState& state, double& energy);
   void measureStability(const ClothState& state, EquilibriumSummary& summary);
   Termination iterate(ClothState& state, const EquilibriumOptions& options,
@@ -87,13 +96,45 @@ double EquilibriumSolver::Impl::roundingOfForces(const ClothState& state) const 
          state.q.cwiseAbs().maxCoeff();
 }
 
+/// A step longer than a third of the sheet is never meant.
+double EquilibriumSolver::Impl::fullStep(const ClothState& state) const {
+  const double size = std::max(state.q.cwiseAbs().maxCoeff(), 1e-3);
+  return std::min(1.0, size / 3.0 / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
+}
+
+/// Takes a Newton step although the energy may rise: bending an almost inextensible sheet along a
+/// straight step stretches it, and the next step takes that out. Returns false, back at the
+/// reference with its step, when kWatchdog such steps have not paid.
+bool EquilibriumSolver::Impl::tryFullStep(ClothState& state, double& energy) {
+  const double slope = g.dot(step);
+  if (reference.steps_since == 0 || energy <= reference.energy) {
+    reference = {state, energy, g, step, 0};
+  }
+  trial = state;
+  const double alpha = fullStep(state);
+  system.advance(trial, step, alpha);
+  const double e = system.energy(trial);
+  const bool falls = e <= energy + kArmijo * alpha * slope;
+  if (std::isfinite(e) && (falls || reference.steps_since < kWatchdog)) {
+    std::swap(state, trial);
+    energy = e;
+    system.gradient(state, g);
+    reference.steps_since = e < reference.energy ? 0 : reference.steps_since + 1;
+    return true;
+  }
+  state = reference.state;
+  energy = reference.energy;
+  g = reference.g;
+  step = reference.step;
+  reference.steps_since = 0;
+  return false;
+}
+
 /// Backtracks until the energy falls enough or, where rounding hides the energy's change, until the
 /// residual falls.
 bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
   const double slope = g.dot(step);
-  const double size = state.q.cwiseAbs().maxCoeff();
-  // A step longer than the sheet is never meant.
-  double alpha = std::min(1.0, std::max(size, 1e-3) / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
+  double alpha = fullStep(state);
   const double rounding = 1e-13 * std::max(std::abs(energy), std::abs(slope));
   const double before = residual(g);
   for (int k = 0; k < kMaxBacktracks; ++k, alpha *= 0.5) {
@@ -174,6 +215,7 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
     }
     const bool exact = newtonDirection(state, summary);
     ++summary.newton_steps;
+    if (exact && tryFullStep(state, energy)) continue;
     if (lineSearch(state, energy)) continue;
     // At the limit of rounding no step can show progress: that is convergence if forces are at that
     // limit too.

@@ -8,7 +8,22 @@
 #include <algorithm>
 #include <stdexcept>
 
+// Provided by OpenBLAS; absent with another BLAS.
+extern "C" void openblas_set_num_threads(int count) __attribute__((weak));
+
 namespace tenter {
+namespace {
+
+/// Supernodes here are so small that a second BLAS thread costs many times what it saves.
+void useOneBlasThread() {
+  static const bool done = [] {
+    if (openblas_set_num_threads) openblas_set_num_threads(1);
+    return true;
+  }();
+  static_cast<void>(done);
+}
+
+}  // namespace
 
 struct SparseCholesky::Impl {
   cholmod_common common{};
@@ -23,6 +38,7 @@ struct SparseCholesky::Impl {
 
   explicit Impl(const SparseLower& pattern)
       : column_begin(pattern.column_begin), row(pattern.row), value(pattern.row.size(), 0.0) {
+    useOneBlasThread();
     cholmod_start(&common);
     common.print = 0;
     common.final_ll = 1;  // L D L' would accept negative pivots
