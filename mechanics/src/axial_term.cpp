@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "parameter_scratch.h"
 #include "tenter/core/result.h"
 
 namespace tenter {
@@ -74,8 +75,7 @@ class AxialTerm final : public EnergyTerm {
 
   void addParameterGradient(const Eigen::VectorXd& q,
                             Eigen::Ref<Eigen::MatrixXd> derivative) const override {
-    static thread_local Eigen::Matrix3Xd by_parameter;
-    by_parameter.resize(3, parameterCount());
+    auto by_parameter = parameterScratch(parameterCount());
     for (const AxialElement& e : elements_) {
       const State s = state(e, q);
       law_->stressByParameter(strainVector(e, s), by_parameter);

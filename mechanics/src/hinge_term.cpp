@@ -4,6 +4,7 @@
 
 #include "angle_difference.h"
 #include "hinge_elements.h"
+#include "parameter_scratch.h"
 #include "projection.h"
 #include "tenter/mechanics/dihedral_angle.h"
 #include "tenter/mechanics/energy_terms.h"
@@ -21,7 +22,6 @@ struct Scratch {
   std::vector<Vec12> gradient;  ///< d theta / dx.
   std::vector<double> moment;   ///< dE / d theta, summed over the triangles.
   std::vector<Mat3> tangent;    ///< d2E / da da of each triangle.
-  Eigen::Matrix3Xd by_parameter;
 };
 
 Scratch& scratch() {
@@ -96,20 +96,20 @@ class HingeBending final : public EnergyTerm {
                             Eigen::Ref<Eigen::MatrixXd> derivative) const override {
     Scratch& s = scratch();
     measureEdges(q, true, &s);
-    s.by_parameter.resize(3, parameterCount());
+    auto by_parameter = parameterScratch(parameterCount());
     for (const HingeTriangle& t : elements_.triangles) {
-      law_->stressByParameter(strain(t, q, s), s.by_parameter);
+      law_->stressByParameter(strain(t, q, s), by_parameter);
       for (const HingeSide& side : t.sides) {
         const Eigen::RowVector3d moment = t.area * side.strain.transpose();
         if (side.scalar >= 0) {
           derivative.row(side.coordinate) +=
-              (side.rotation_share * moment).lazyProduct(s.by_parameter);
+              (side.rotation_share * moment).lazyProduct(by_parameter);
         }
         if (side.edge < 0) continue;
         for (int i = 0; i < 4; ++i) {
           const Mat3 rows = side.angle_share * s.gradient[side.edge].segment<3>(3 * i) * moment;
           derivative.middleRows<3>(3 * elements_.edges[side.edge].nodes[i]) +=
-              rows.lazyProduct(s.by_parameter);
+              rows.lazyProduct(by_parameter);
         }
       }
     }

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "parameter_scratch.h"
 #include "projection.h"
 #include "tenter/mechanics/energy_terms.h"
 
@@ -141,8 +142,7 @@ class MembraneTerm final : public EnergyTerm {
 
   void addParameterGradient(const Eigen::VectorXd& q,
                             Eigen::Ref<Eigen::MatrixXd> derivative) const override {
-    static thread_local Eigen::Matrix3Xd by_parameter;
-    by_parameter.resize(3, parameterCount());
+    auto by_parameter = parameterScratch(parameterCount());
     for (const Element& e : elements_) {
       const Vec6 f = deformation(e, q);
       law_->stressByParameter(Measure::strain(f), by_parameter);

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "angle_difference.h"
+#include "parameter_scratch.h"
 #include "tenter/mechanics/dihedral_angle.h"
 #include "tenter/mechanics/energy_terms.h"
 
@@ -85,8 +86,7 @@ class RawHingeTerm final : public EnergyTerm {
 
   void addParameterGradient(const Eigen::VectorXd& q,
                             Eigen::Ref<Eigen::MatrixXd> derivative) const override {
-    static thread_local Eigen::Matrix3Xd by_parameter;
-    by_parameter.resize(3, parameterCount());
+    auto by_parameter = parameterScratch(parameterCount());
     Vec12 g;
     for (const Element& e : elements_) {
       law_->stressByParameter(strain(e, q, &g, nullptr), by_parameter);
