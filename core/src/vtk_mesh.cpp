@@ -6,6 +6,7 @@
 #include <vtkCommand.h>
 #include <vtkDataArray.h>
 #include <vtkDoubleArray.h>
+#include <vtkLogger.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkOutputWindow.h>
@@ -65,6 +66,9 @@ class ComplaintScope {
     std::call_once(once, [] {
       const vtkNew<CatchingWindow> window;
       vtkOutputWindow::SetInstance(window);
+      // VTK logs to the terminal before it asks any window; a program that wants the log adds its
+      // own sink.
+      vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
     });
     active_complaint = &text_;
   }
