@@ -148,9 +148,11 @@ CurveValue StiffnessCurve::evaluate(double strain) const {
   const double t = e - piece.anchor;
   const double(&c)[4] = piece.stiffness;
   const double(&w)[6] = piece.energy;
+  // Pairs instead of Horner's chain: the same operations, but not each waiting for the one before.
+  const double t2 = t * t;
   CurveValue value;
-  value.stiffness = c[0] + t * (c[1] + t * (c[2] + t * c[3]));
-  value.energy = w[0] + t * (w[1] + t * (w[2] + t * (w[3] + t * (w[4] + t * w[5]))));
+  value.stiffness = (c[0] + t * c[1]) + t2 * (c[2] + t * c[3]);
+  value.energy = (w[0] + t * w[1]) + t2 * ((w[2] + t * w[3]) + t2 * (w[4] + t * w[5]));
   value.stress = value.stiffness * strain;
   value.tangent = value.stiffness + e * (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3]));
   return value;
