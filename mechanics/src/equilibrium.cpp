@@ -191,6 +191,7 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
                                : kForceToleranceOfNodeWeight * system.lightestFreeNodeWeight_N();
   double energy = system.energy(state);
   system.gradient(state, g);
+  reference.steps_since = 0;  // whatever an earlier solve left there is of another state
   int saddles = 0;
   for (int k = 0;; ++k) {
     summary.residual_N = residual(g);
