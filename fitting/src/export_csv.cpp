@@ -52,19 +52,16 @@ double stdAt(const MaterialComponent& component, double strain) {
 
 using Points = std::vector<std::pair<double, double>>;
 
-/// The reader's formula: straight lines between rows, constant stiffness beyond.
+/// The reader's formula: stiffness by straight lines between rows, constant beyond, times strain.
 double interpolatedStress(const Points& points, double strain, bool even) {
   const double at = even ? std::abs(strain) : strain;
-  const double sign = even && strain < 0.0 ? -1.0 : 1.0;
-  if (at <= points.front().first || at >= points.back().first) {
-    const auto& end = at <= points.front().first ? points.front() : points.back();
-    return end.first == 0.0 ? 0.0 : sign * end.second / end.first * at;
-  }
+  if (at <= points.front().first) return points.front().second * strain;
+  if (at >= points.back().first) return points.back().second * strain;
   const auto above = std::upper_bound(points.begin(), points.end(), at,
                                       [](double x, const auto& p) { return x < p.first; });
   const auto& [x1, y1] = *above;
   const auto& [x0, y0] = *(above - 1);
-  return sign * (y0 + (y1 - y0) * (at - x0) / (x1 - x0));
+  return (y0 + (y1 - y0) * (at - x0) / (x1 - x0)) * strain;
 }
 
 struct ErrorSum {
@@ -107,7 +104,7 @@ Result<ExportedMaterial> make(const Material& material, const ExportOptions& /*o
     Points points;
     for (const double strain : strainsOf(component)) {
       const CurveValue value = component.curve.evaluate(strain);
-      points.emplace_back(strain, value.stress);
+      points.emplace_back(strain, value.stiffness);
       exported.content += component.name + "," + number(strain) + "," + number(value.stiffness) +
                           "," + number(value.stress) + "," + number(stdAt(component, strain)) +
                           "\n";
@@ -117,7 +114,7 @@ Result<ExportedMaterial> make(const Material& material, const ExportOptions& /*o
   exported.rms_rel = sum.count > 0 ? std::sqrt(sum.squares / sum.count) : 0.0;
   exported.max_rel = sum.largest;
   exported.bending_rms_rel = exported.bending_max_rel = std::numeric_limits<double>::quiet_NaN();
-  exported.lost.emplace_back("curves become straight lines between rows");
+  exported.lost.emplace_back("the cubic curves become straight lines of stiffness between rows");
   exported.lost.emplace_back("correlations and provenance");
   return exported;
 }

@@ -21,6 +21,7 @@ constexpr double kMinStrain = 1e-4;     // a whole test below this is a displace
 constexpr double kTurnFraction = 0.01;  // of the travel: less is the clamp's jitter
 constexpr int kMaxTurns = 60;           // thirty cycles; more is not a test but noise
 constexpr double kFirstRowsFraction = 0.06;
+constexpr Eigen::Index kFewFirstRows = 8, kFirstRows = 32;
 constexpr double kMaxExtrapolation = 0.05;  // of the strip's length
 constexpr double kMax_mm = 2000.0;
 
@@ -100,30 +101,42 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Median of the slopes between all pairs of the first rows (Theil and Sen), and the force at
-/// displacement 0 on that line.
+/// At most kFirstRows of the first rows, evenly chosen.
+std::vector<Eigen::Index> firstRows(Eigen::Index rows) {
+  const auto share = static_cast<Eigen::Index>(kFirstRowsFraction * static_cast<double>(rows));
+  const Eigen::Index last = std::min(std::max(share, kFewFirstRows), rows);
+  const Eigen::Index step = (last + kFirstRows - 1) / kFirstRows;
+  std::vector<Eigen::Index> chosen;
+  for (Eigen::Index i = 0; i < last; i += step) chosen.push_back(i);
+  return chosen;
+}
+
+/// Force at displacement 0 and its slope there: medians over the parabolas through all triples of
+/// the first rows, so that neither an outlier nor the curve's own bend moves them far.
 struct InitialLine {
   double slope_N_per_m = 0.0, force_N = 0.0;
   bool found = false;
 };
 InitialLine initialLine(const Rows& rows) {
-  const auto fraction = static_cast<Eigen::Index>(
-      std::ceil(kFirstRowsFraction * static_cast<double>(rows.force_N.size())));
-  const Eigen::Index count = std::clamp<Eigen::Index>(fraction, kMinRows, 200);
+  const auto chosen = firstRows(rows.force_N.size());
   std::vector<double> slopes, forces;
-  for (Eigen::Index i = 0; i < count; ++i) {
-    for (Eigen::Index j = i + 1; j < count; ++j) {
-      const double travel = rows.displacement_m(j) - rows.displacement_m(i);
-      if (travel != 0.0) slopes.push_back((rows.force_N(j) - rows.force_N(i)) / travel);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    for (std::size_t j = i + 1; j < chosen.size(); ++j) {
+      for (std::size_t k = j + 1; k < chosen.size(); ++k) {
+        const double a = rows.displacement_m(chosen[i]), b = rows.displacement_m(chosen[j]),
+                     c = rows.displacement_m(chosen[k]);
+        if (a == b || b == c || a == c) continue;
+        const double first = rows.force_N(chosen[i]);
+        const double ab = (rows.force_N(chosen[j]) - first) / (b - a);
+        const double ac = (rows.force_N(chosen[k]) - first) / (c - a);
+        const double bend = (ac - ab) / (c - b);
+        slopes.push_back(ab - bend * (a + b));
+        forces.push_back(first - ab * a + bend * a * b);
+      }
     }
   }
   if (slopes.empty()) return {};
-  InitialLine line{median(slopes), 0.0, true};
-  for (Eigen::Index i = 0; i < count; ++i) {
-    forces.push_back(rows.force_N(i) - line.slope_N_per_m * rows.displacement_m(i));
-  }
-  line.force_N = median(forces);
-  return line;
+  return {median(std::move(slopes)), median(std::move(forces)), true};
 }
 
 Result<double> extrapolatedOffset(const NumberedTable& table, const Rows& rows, double length_m) {
