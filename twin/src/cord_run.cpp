@@ -6,6 +6,7 @@
 #include "random_numbers.h"
 #include "rig_setup.h"
 #include "sheet_sampler.h"
+#include "stable_shape.h"
 #include "virtual_cloth.h"
 
 namespace tenter {
@@ -140,11 +141,7 @@ class CordRun {
     return sum / cords;
   }
 
-  bool solve() {
-    const EquilibriumSummary summary = solver_->solve(state_);
-    count(summary, run_.statistics);
-    return summary.converged() && summary.stable;
-  }
+  bool solve() { return solver_->solve(state_, run_.statistics); }
 
   /// Moves one channel's actuators to `travel_m`, in smaller steps where one step fails.
   bool moveTo(int channel, double travel_m) {
@@ -250,7 +247,7 @@ class CordRun {
   std::optional<SheetSampler> sampler_;
   std::shared_ptr<FrictionalLaw> friction_;
   std::optional<ClothSystem> system_;
-  std::optional<EquilibriumSolver> solver_;
+  std::optional<StableShapeSolver> solver_;
   ClothState state_;
   std::vector<std::vector<int>> clamped_;
   std::vector<double> lengths_;

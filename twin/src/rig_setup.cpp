@@ -16,8 +16,8 @@ constexpr double kLightBar_kg = 0.0101, kHeavyBar_kg = 0.0133, kCornerMass_kg = 
 constexpr double kReach_m = 0.12;         // clip to pulley at rest
 constexpr double kPulleyHeight_m = 0.02;  // so that slack cords lift the clips' weight
 constexpr double kTensionSpring_N_per_m =
-    500.0;  // in every cord: forces then follow actuators smoothly
-constexpr double kHoldSpring_N_per_m = 25.0;  // in cords that only keep the sheet taut
+    500.0;                               // in every cord: forces then follow actuators smoothly
+constexpr double kHoldStretch_m = 0.04;  // in cords that only keep the sheet taut
 
 struct CordPlan {
   const char* name;
@@ -83,7 +83,8 @@ RigSetup stretchRig(const Fabric& fabric, int axis, int frames) {
 
 RigSetup shearRig(const Fabric& fabric, int frames) {
   constexpr double kTilt = 0.15;  // outwards, so that pulling also keeps the sheet taut
-  const double hold = std::max(0.4, 0.35 * fabric.limits.shear_N), pretension = 0.1;
+  // More than the pull: the sheet then has no compression to buckle under.
+  const double hold = 1.2 * fabric.limits.shear_N, pretension = 0.1;
   // The clip of the side y = kSide, pulled towards its end at x = kSide; `turned` makes the other
   // three.
   const auto clip = [&](const char* id, const std::function<Vec2(double, double)>& turned) {
@@ -93,7 +94,7 @@ RigSetup shearRig(const Fabric& fabric, int frames) {
                    {{"pull", turned(kSide - 0.005, kSide), turned(1.0, kTilt) - origin, pretension,
                      kTensionSpring_N_per_m, 0},
                     {"hold", turned(0.5 * kSide, kSide + 0.004), turned(0.0, 1.0) - origin, hold,
-                     kHoldSpring_N_per_m, -1}});
+                     hold / kHoldStretch_m, -1}});
   };
   RigSetup rig;
   rig.clips.push_back(clip("top", [](double x, double y) { return Vec2(x, y); }));

@@ -5,6 +5,7 @@
 
 #include "rig_setup.h"
 #include "sheet_sampler.h"
+#include "stable_shape.h"
 #include "virtual_cloth.h"
 
 namespace tenter {
@@ -97,10 +98,8 @@ class TableRun {
     start(*system, lines, edge, state);
     system->setClipPose(state, 0, pose);
 
-    EquilibriumSolver solver(*system);
-    const EquilibriumSummary summary = solver.solve(state);
-    count(summary, run_.statistics);
-    if (!summary.converged() || !summary.stable) return false;
+    StableShapeSolver solver(*system);
+    if (!solver.solve(state, run_.statistics)) return false;
     remember(state.positions(system->sheet().nodeCount()), lines, edge);
     if (recorded) record(state.positions(system->sheet().nodeCount()), lines, edge, pose, frame);
     return true;

@@ -28,17 +28,19 @@ Result<ClothSource> makeClothSource(const Fabric& specimen, const std::optional<
   return out;
 }
 
-Vec2 materialPoint(Vec2 place, bool on_bias) {
-  if (!on_bias) return place;
-  constexpr double kHalfRoot = 0.5 * std::numbers::sqrt2;
-  return {kHalfRoot * (place.x() - place.y()), kHalfRoot * (place.x() + place.y())};
-}
+namespace {
 
-SheetMesh sampleSheet(GridLines lines, bool on_bias) {
-  SheetMesh sheet = gridSheet(std::move(lines));
-  if (!on_bias) return sheet;
+constexpr double kBias_rad = 0.25 * std::numbers::pi;
+
+Vec2 turned(Vec2 place, double angle_rad) { return Eigen::Rotation2Dd(angle_rad) * place; }
+
+}  // namespace
+
+Vec2 materialPoint(Vec2 place, bool on_bias) { return on_bias ? turned(place, kBias_rad) : place; }
+
+void turnMaterial(SheetMesh& sheet, double angle_rad) {
   for (int n = 0; n < sheet.nodeCount(); ++n) {
-    sheet.rest.uv.col(n) = materialPoint(sheet.rest.positions.col(n).head<2>(), true);
+    sheet.rest.uv.col(n) = turned(sheet.rest.positions.col(n).head<2>(), angle_rad);
   }
   for (int t = 0; t < sheet.triangleCount(); ++t) {
     const Triangle& ids = sheet.rest.triangles[t];
@@ -48,7 +50,12 @@ SheetMesh sampleSheet(GridLines lines, bool on_bias) {
     sheet.triangles[t].edges_inverse = edges.inverse();
   }
   sheet.grid.reset();
-  sheet.pattern += " on the bias";
+  sheet.pattern += " turned";
+}
+
+SheetMesh sampleSheet(GridLines lines, bool on_bias) {
+  SheetMesh sheet = gridSheet(std::move(lines));
+  if (on_bias) turnMaterial(sheet, kBias_rad);
   return sheet;
 }
 
@@ -76,7 +83,6 @@ TriangleMesh trackedMesh(int per_side, bool on_bias) {
 void count(const EquilibriumSummary& summary, CaptureStatistics& statistics) {
   statistics.newton_steps += summary.newton_steps;
   statistics.factorizations += summary.factorizations;
-  statistics.largest_residual_N = std::max(statistics.largest_residual_N, summary.residual_N);
 }
 
 }  // namespace tenter

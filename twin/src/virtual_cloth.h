@@ -20,6 +20,10 @@ struct ClothSource {
 };
 Result<ClothSource> makeClothSource(const Fabric& specimen, const std::optional<OwnLaw>& own_law);
 
+/// Turns the material directions of a flat sheet: the x axis then lies at `angle_rad` from the
+/// weft. Such a sheet is no grid any more to springs, which follow mesh lines.
+void turnMaterial(SheetMesh& sheet, double angle_rad);
+
 /// The flat sample over [0, side]^2 on given lines; on the bias its material directions are turned
 /// by 45 degrees (u along the diagonal of x and y), which grids of springs cannot follow.
 SheetMesh sampleSheet(GridLines lines, bool on_bias);
@@ -51,7 +55,7 @@ Result<CaptureRun> runCords(const CaptureOptions& options, const Fabric& specime
 Result<CaptureRun> runTable(const CaptureOptions& options, const Fabric& specimen,
                             const ClothSource& cloth);
 
-/// Adds a solve to the statistics.
+/// Adds the cost of a solve to the statistics.
 void count(const EquilibriumSummary& summary, CaptureStatistics& statistics);
 
 }  // namespace tenter
