@@ -152,6 +152,15 @@ Result<void> checkRest(const Measurement& m, const std::string& file) {
   return out.result();
 }
 
+Result<void> checkFrames(const Measurement& m, const std::string& folder) {
+  namespace format = measurement_format;
+  for (std::size_t i = 0; i < m.frames.size(); ++i) {
+    const std::string mesh_file = folder + format::meshFileOfFrame(i);
+    if (auto done = checkFrame(m, i, folder + format::kFramesFile, mesh_file); !done) return done;
+  }
+  return {};
+}
+
 Result<void> validateMeasurement(const Measurement& m, const std::string& file) {
   namespace format = measurement_format;
   const std::string folder = file.empty() ? "" : file + "/";
@@ -159,11 +168,7 @@ Result<void> validateMeasurement(const Measurement& m, const std::string& file) 
     return done;
   }
   if (auto done = checkRest(m, folder + format::kRestFile); !done) return done;
-  for (std::size_t i = 0; i < m.frames.size(); ++i) {
-    const std::string mesh_file = folder + format::meshFileOfFrame(i);
-    if (auto done = checkFrame(m, i, folder + format::kFramesFile, mesh_file); !done) return done;
-  }
-  return {};
+  return checkFrames(m, folder);
 }
 
 }  // namespace tenter

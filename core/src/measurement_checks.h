@@ -17,6 +17,9 @@ Result<void> checkRest(const Measurement& m, const std::string& file);
 Result<void> checkFrame(const Measurement& m, std::size_t frame, const std::string& file,
                         const std::string& mesh_file);
 
+/// checkFrame on all; `folder` ends in a slash or is empty.
+Result<void> checkFrames(const Measurement& m, const std::string& folder);
+
 /// Collects the first complaint about a file; straight lists of checks read better than a return a
 /// line.
 class Complaint {

@@ -262,7 +262,7 @@ Result<Measurement> readMeasurement(const fs::path& folder) {
   }
   if (auto done = checkRest(m, (folder / format::kRestFile).string()); !done) return done.error();
   if (auto done = readFrames(folder, *version, m); !done) return done.error();
-  if (auto done = validateMeasurement(m, folder.string()); !done) return done.error();
+  if (auto done = checkFrames(m, (folder / "").string()); !done) return done.error();
 
   m.name = fs::weakly_canonical(folder, error).filename().string();
   auto hash = sha256OfPath(folder);
