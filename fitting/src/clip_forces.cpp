@@ -8,8 +8,8 @@ namespace {
 
 /// Of load cells where the measurement states none [Est12] sec. 3.3.
 constexpr double kDefaultTension_N = 3e-3;
-/// Of the observed direction of a cord.
-constexpr double kDirection_rad = 1e-3;
+/// Of the observed direction of a cord, per transverse axis; measurements do not state it.
+constexpr double kDirection_rad = 5e-4;
 /// Added to every force component: what no listed cause explains, and what keeps slack cords'
 /// covariance regular.
 constexpr double kFloor_N = 3e-4;
