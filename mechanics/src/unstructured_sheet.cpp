@@ -12,7 +12,7 @@ namespace tenter {
 namespace {
 
 /// Displacement of a point, in edge lengths: keeps angles above 20 degrees.
-constexpr double kJitter = 0.17;
+constexpr double kJitter = 0.13;
 /// Distance of the enclosing triangle, in sizes of the point set: far enough not to cut the convex
 /// hull, near enough for doubles.
 constexpr double kEnclosure = 1e4;
@@ -65,7 +65,7 @@ bool inCircle(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
          0.0;
 }
 
-/// Replaces the triangles whose circle holds the point by a fan around it [Bowyer81, Watson81].
+/// Replaces the triangles whose circle holds the point by a fan around it (Bowyer and Watson).
 void insertPoint(const std::vector<Vec2>& points, int id, std::vector<Triangle>* triangles) {
   std::map<std::pair<int, int>, int> border;
   std::vector<Triangle> kept;

@@ -11,7 +11,8 @@ namespace tenter {
 /// bending term, each times its edge's length so that every entry is in metres and every force in
 /// newtons.
 
-/// Whether indefinite element Hessians are replaced by their nearest positive semi-definite ones.
+/// Whether indefinite element Hessians are replaced by positive semi-definite ones: springs and
+/// membranes by clamped eigenvalues, hinges by Gauss-Newton without d2 theta.
 enum class Projection { kNone, kPositiveSemiDefinite };
 
 /// Coordinates that one element couples: whole nodes first, then single coordinates.
@@ -31,9 +32,9 @@ class HessianSink {
   virtual void add(int element, const double* block) = 0;
 };
 
-/// One kind of energy on a sheet: membrane triangles, springs, hinges, gravity. Const members never
-/// allocate (after construction) and may be called from several threads; q always has
-/// coordinateCount entries.
+/// One kind of energy on a sheet: membrane triangles, springs, hinges, gravity. Const members may
+/// be called from several threads and never allocate, but for scratch memory that a thread grows on
+/// its first call; q always has coordinateCount entries.
 class EnergyTerm {
  public:
   virtual ~EnergyTerm() = default;

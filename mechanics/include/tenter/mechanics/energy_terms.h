@@ -26,9 +26,10 @@ std::unique_ptr<EnergyTerm> makeRing1SpringTerm(const SheetMesh& sheet,
 std::unique_ptr<EnergyTerm> makeRing2SpringTerm(const SheetMesh& sheet,
                                                 std::shared_ptr<const StrainLaw> law);
 
-/// Which edges carry a rotation of their own (docs/mechanics.md). Boundary edges always do: it is
-/// what makes the free edge moment-free. Interior edges need one wherever the half dihedral angles
-/// alone do not reproduce constant curvature.
+/// Which edges carry a rotation of their own (docs/mechanics-elements.md). Boundary edges always
+/// do: it is what makes the free edge moment-free. kAutomatic adds the interior edges, one by one,
+/// whose half dihedral angles do not reproduce constant curvature; all of them if the rest mesh is
+/// curved.
 enum class EdgeRotations { kAutomatic, kBoundaryOnly, kAll };
 
 /// Bending by dihedral angles: curvature of triangle f, rest curvature subtracted,

@@ -45,8 +45,10 @@ struct SheetMesh {
 SheetMesh gridSheet(GridLines lines);
 /// n x m equal intervals' nodes over [0, size]; counts are nodes.
 SheetMesh gridSheet(Vec2 size_m, int nodes_u, int nodes_v, DiagonalPattern diagonals);
-/// `nodes` lines over [begin, end] with the nearest lines moved onto `stops` (clip and table
-/// edges); spacing stays within a factor of two of uniform where the stops allow.
+/// `nodes` lines over [begin, end] (more only if the stops need them), through `stops` (clip and
+/// table edges), evenly spaced between these; spacing stays within a factor of two of uniform where
+/// the stops allow. Stops outside, or within 1e-6 of the length of an end or of another, are
+/// dropped.
 std::vector<double> linesThrough(double begin, double end, int nodes, std::vector<double> stops);
 /// Flat rectangle with irregular triangles (jittered points, Delaunay), seeded; for tests of mesh
 /// independence.
