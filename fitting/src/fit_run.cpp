@@ -25,6 +25,8 @@ constexpr int kEarlyIterations = 10;
 constexpr double kNarrowRange = 1e-6;
 /// Sum of squares per residual below which data are met to rounding and knots cannot help.
 constexpr double kNothingLeft = 1e-12;
+/// A curve gets at most a coefficient for this many residuals: one hanging strip knows one number.
+constexpr int kResidualsPerCoefficient = 2;
 /// The golden ratio's fraction: its multiples spread over [0, 1) without rhythm.
 constexpr double kGolden = 0.6180339887498949;
 
@@ -194,11 +196,15 @@ void FitRun::addKnots(int group, const std::vector<int>& tests, const OuterOptio
   const double width = range.end - range.begin;
   if (!(width > kNarrowRange * std::max(std::abs(range.begin), std::abs(range.end)))) return;
   double cost = last_.cost;
+  long residuals = 0;
+  for (const int t : tests) residuals += evaluator_.rawResidualCount(t);
   for (int knots = 2; knots <= options_.max_knots && !evaluator_.cancelled(); ++knots) {
     if (2.0 * cost < kNothingLeft * static_cast<double>(evaluator_.frames().size())) return;
     const FitState before = state_;
     state_.setKnots(group, equidistantKnots(range.begin, range.end, knots));
-    const bool better = solve({group}, tests, kEarlyFrames, outer, name) &&
+    const bool affordable =
+        kResidualsPerCoefficient * state_.groups[group].basis->size() <= residuals;
+    const bool better = affordable && solve({group}, tests, kEarlyFrames, outer, name) &&
                         cost - last_.cost >= options_.knot_improvement * cost;
     if (!better) {
       state_ = before;

@@ -126,11 +126,6 @@ void FrameEvaluator::accept() {
 
 int FrameEvaluator::dropFailing(const Eigen::VectorXd& z) {
   if (evaluate(z, false) || cancelled()) return 0;
-  std::set<int> failing;
-  for (std::size_t i = 0; i < frames_.size(); ++i)
-    if (!blocks_[i].outcome.converged) failing.insert(frames_[i].test);
-  for (const int t : failing) tests_[t]->restart();
-  if (evaluate(z, false) || cancelled()) return 0;
   std::vector<FrameId> kept;
   for (std::size_t i = 0; i < frames_.size(); ++i)
     if (blocks_[i].outcome.converged) kept.push_back(frames_[i]);

@@ -15,7 +15,9 @@ namespace {
 constexpr double kRoundingCost = 1e-18;
 /// Smallest relative change of z that is worth another set of equilibria.
 constexpr double kParameterTolerance = 1e-9;
-constexpr int kMaxRejectedSteps = 8;
+/// Each rejection shortens the step by twice as much as the last: after five there is nothing to
+/// gain.
+constexpr int kMaxRejectedSteps = 5;
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 

@@ -79,11 +79,11 @@ Result<std::unique_ptr<FitTest>> makeFake(const World& world, const Measurement&
     frame.sigma_N = world.sigma_N > 0.0 ? world.sigma_N : 0.01;
     frames.push_back(frame);
   }
-  FakeTest measuring(m, frames, kSeries_N);
+  FakeTest measuring(m, frames, kSeries_N * world.scale);
   measuring.setParameters(truth);
   for (FakeFrame& frame : frames)
     frame.measured_N = measuring.force(frame) + (world.sigma_N > 0.0 ? noise(random) : 0.0);
-  auto test = std::make_unique<FakeTest>(m, frames, kSeries_N);
+  auto test = std::make_unique<FakeTest>(m, frames, kSeries_N * world.scale);
   const double limit = world.breaks_beyond_N;
   test->breaks = [limit](double force) { return force > limit; };
   return std::unique_ptr<FitTest>(std::move(test));
