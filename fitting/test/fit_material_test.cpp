@@ -76,7 +76,7 @@ Result<std::unique_ptr<FitTest>> makeFake(const World& world, const Measurement&
   std::vector<FakeFrame> frames;
   for (int i = 0; i < kFrames; ++i) {
     FakeFrame frame{.components = {c}, .travel = kLargestStrain * 1.05 * i / (kFrames - 1)};
-    frame.sigma_N = world.sigma_N > 0.0 ? world.sigma_N : 0.01;
+    frame.sigma_N = world.sigma_N > 0.0 ? world.sigma_N : 0.01 * world.scale;
     frames.push_back(frame);
   }
   FakeTest measuring(m, frames, kSeries_N * world.scale);
