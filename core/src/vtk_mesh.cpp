@@ -113,7 +113,8 @@ Result<void> readArrays(vtkDataSetAttributes& attributes, vtkIdType count, const
     vtkDataArray* array = attributes.GetArray(i);
     if (array == nullptr) continue;
     const std::string name = array->GetName() != nullptr ? array->GetName() : "";
-    const std::string place = kind + " array \"" + name + "\"";
+    std::string place = kind;
+    place.append(" array \"").append(name).append("\"");
     if (array->GetNumberOfTuples() != count) {
       return badInput(file, place,
                       "has " + std::to_string(array->GetNumberOfTuples()) + " entries instead of " +
