@@ -97,7 +97,7 @@ SheetMesh gridSheet(GridLines lines) {
   return sheet;
 }
 
-SheetMesh gridSheet(Vec2 size_m, int nodes_u, int nodes_v, DiagonalPattern diagonals) {
+SheetMesh gridSheet(const Vec2& size_m, int nodes_u, int nodes_v, DiagonalPattern diagonals) {
   require(nodes_u >= 2 && nodes_v >= 2 && size_m.minCoeff() > 0.0,
           "gridSheet: a positive size and at least two nodes each way");
   return gridSheet(

@@ -106,7 +106,7 @@ std::vector<Triangle> delaunay(std::vector<Vec2> points, const Vec2& size) {
 
 }  // namespace
 
-SheetMesh unstructuredSheet(Vec2 size_m, double edge_m, std::uint64_t seed) {
+SheetMesh unstructuredSheet(const Vec2& size_m, double edge_m, std::uint64_t seed) {
   require(size_m.minCoeff() > 0.0 && edge_m > 0.0, "unstructuredSheet: a positive size and edge");
   const std::vector<Vec2> points = jitteredPoints(size_m, edge_m, seed);
   Points2 uv(2, static_cast<Eigen::Index>(points.size()));

@@ -44,7 +44,7 @@ struct SheetMesh {
 /// Flat grid in the plane z = 0, x = u, y = v.
 SheetMesh gridSheet(GridLines lines);
 /// n x m equal intervals' nodes over [0, size]; counts are nodes.
-SheetMesh gridSheet(Vec2 size_m, int nodes_u, int nodes_v, DiagonalPattern diagonals);
+SheetMesh gridSheet(const Vec2& size_m, int nodes_u, int nodes_v, DiagonalPattern diagonals);
 /// `nodes` lines over [begin, end] (more only if the stops need them), through `stops` (clip and
 /// table edges), evenly spaced between these; spacing stays within a factor of two of uniform where
 /// the stops allow. Stops outside, or within 1e-6 of the length of an end or of another, are
@@ -52,7 +52,7 @@ SheetMesh gridSheet(Vec2 size_m, int nodes_u, int nodes_v, DiagonalPattern diago
 std::vector<double> linesThrough(double begin, double end, int nodes, std::vector<double> stops);
 /// Flat rectangle with irregular triangles (jittered points, Delaunay), seeded; for tests of mesh
 /// independence.
-SheetMesh unstructuredSheet(Vec2 size_m, double edge_m, std::uint64_t seed);
+SheetMesh unstructuredSheet(const Vec2& size_m, double edge_m, std::uint64_t seed);
 /// From a mesh file. Without uv a flat mesh takes its own x, y (after rotation into the plane); a
 /// curved one without uv is an error unless `isotropic` (directions do not matter), when each
 /// triangle gets any frame.
