@@ -14,12 +14,12 @@ namespace {
 constexpr double kOutlierQuantile = 0.005;
 /// Frames a test in the stages before the last: enough for five knots, and three times fewer
 /// equilibria.
-constexpr int kEarlyFrames = 15;
+constexpr int kEarlyFrames = 12;
 constexpr int kScanFrames = 4;
 /// Stages stop when the cost falls by less than 1 % ([Est12] sec. 5.1); the last pass goes on to
 /// where equilibria are noise.
 constexpr double kEarlyTolerance = 1e-2;
-constexpr double kFinalTolerance = 1e-9;
+constexpr double kFinalTolerance = 1e-6;
 constexpr int kEarlyIterations = 10;
 /// Ranges narrower than this share of their place hold one knot only.
 constexpr double kNarrowRange = 1e-6;
