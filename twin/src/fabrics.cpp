@@ -26,7 +26,7 @@ Fabric satin() {
                 .fung_cross = 4500.0};
   f.bending = {
       .rigidity_N_m = {5.0e-6, 5.0e-6, 2.5e-6}, .floor = 0.6, .knee_per_m = 120.0, .poisson = 0.15};
-  f.friction = {.yield_N_per_m = {12.0, 12.0, 1.2}, .slip_strain = {5e-4, 5e-4, 0.03}};
+  f.friction = {.yield_N_per_m = {9.0, 9.0, 1.2}, .slip_strain = {5e-4, 5e-4, 0.03}};
   f.limits = {.stretch_weft_N = 10.0,
               .stretch_warp_N = 10.0,
               .shear_N = 1.0,
@@ -47,7 +47,7 @@ Fabric knit() {
                 .fung_cross = 0.8};
   f.bending = {
       .rigidity_N_m = {2.0e-6, 2.0e-6, 0.9e-6}, .floor = 0.8, .knee_per_m = 150.0, .poisson = 0.15};
-  f.friction = {.yield_N_per_m = {2.5, 2.5, 0.5}, .slip_strain = {0.02, 0.02, 0.03}};
+  f.friction = {.yield_N_per_m = {1.9, 1.9, 0.5}, .slip_strain = {0.02, 0.02, 0.03}};
   f.limits = {.stretch_weft_N = 2.6,
               .stretch_warp_N = 2.6,
               .shear_N = 0.7,
@@ -62,7 +62,7 @@ Fabric denim() {
                "cotton denim: stiff, above all in shear; bending 33 times stiffer along the weft"};
   f.areal_density_kg_per_m2 = 0.46;
   f.thickness_m = 0.90e-3;
-  f.membrane = {.base_N_per_m = {4800.0, 5400.0, 420.0},
+  f.membrane = {.base_N_per_m = {4800.0, 5400.0, 360.0},
                 .poisson = 0.15,
                 .fung_N_per_m = 0.5,
                 .fung_exponent = {4000.0, 5000.0, 60.0},
@@ -71,7 +71,7 @@ Fabric denim() {
                .floor = 0.55,
                .knee_per_m = 60.0,
                .poisson = 0.10};
-  f.friction = {.yield_N_per_m = {12.0, 12.0, 5.0}, .slip_strain = {1e-3, 1e-3, 0.008}};
+  f.friction = {.yield_N_per_m = {9.0, 9.0, 5.0}, .slip_strain = {1e-3, 1e-3, 0.008}};
   f.limits = {.stretch_weft_N = 10.0,
               .stretch_warp_N = 10.0,
               .shear_N = 4.0,
@@ -85,14 +85,14 @@ Fabric wool() {
            .description = "wool and cotton: 10 times stiffer along the warp, 13 times in bending"};
   f.areal_density_kg_per_m2 = 0.24;
   f.thickness_m = 0.50e-3;
-  f.membrane = {.base_N_per_m = {270.0, 4200.0, 14.0},
+  f.membrane = {.base_N_per_m = {270.0, 4700.0, 14.0},
                 .poisson = 0.15,
                 .fung_N_per_m = 8.0,
                 .fung_exponent = {12.0, 190.0, 2.5},
                 .fung_cross = 15.0};
   f.bending = {
       .rigidity_N_m = {2.0e-6, 2.6e-5, 3.6e-6}, .floor = 0.6, .knee_per_m = 90.0, .poisson = 0.10};
-  f.friction = {.yield_N_per_m = {12.0, 12.0, 1.2}, .slip_strain = {0.01, 1.5e-3, 0.03}};
+  f.friction = {.yield_N_per_m = {8.0, 9.0, 1.2}, .slip_strain = {0.01, 1.5e-3, 0.03}};
   f.limits = {.stretch_weft_N = 10.0,
               .stretch_warp_N = 10.0,
               .shear_N = 1.0,

@@ -18,6 +18,9 @@ constexpr double kDescentTolerance = 1e-2;  // of the lightest node's weight: Ne
 constexpr double kLongestMove_m =
     0.004;  // a few meshes: farther, and sheets fold through themselves
 constexpr double kArmijo = 1e-4;
+constexpr double kSmallestShift_N_per_m = 1e-5;
+constexpr double kFirstMove_m = 1e-6;
+constexpr int kInverseIterations = 6;
 constexpr int kMaxBacktracks = 30;
 
 }  // namespace
@@ -56,7 +59,8 @@ bool StableShapeSolver::factorizeShifted(const ClothState& state, double& shift,
         h.row.data(), h.value.data());
     cholesky_.analyzePattern(shifted_);
   }
-  for (; shift <= kLargestShift_N_per_m; shift = kStiffen * shift) {
+  for (; shift <= kLargestShift_N_per_m;
+       shift = std::max(kStiffen * shift, kSmallestShift_N_per_m)) {
     std::copy(h.value.begin(), h.value.end(), shifted_.valuePtr());
     for (int c = 0; c < h.size; ++c) shifted_.valuePtr()[h.column_begin[c]] += shift;
     cholesky_.factorize(shifted_);
@@ -81,13 +85,41 @@ bool StableShapeSolver::lineSearch(ClothState& state, double& energy) {
   return false;
 }
 
+void StableShapeSolver::leaveRidge(ClothState& state, double& energy) {
+  // Inverse iteration: the factors at hand are those of H + shift I with the shift just large
+  // enough.
+  Eigen::VectorXd direction(system_.dofCount());
+  for (Eigen::Index i = 0; i < direction.size(); ++i)
+    direction[i] = std::sin(1.0 + 2.399963 * static_cast<double>(i));
+  for (int k = 0; k < kInverseIterations; ++k) direction = cholesky_.solve(direction).normalized();
+  direction /= direction.cwiseAbs().maxCoeff();
+  ClothState lowest = state;
+  double lowest_energy = energy;
+  for (double length = kFirstMove_m; length <= kLongestMove_m; length *= 3.0) {
+    for (const double sign : {1.0, -1.0}) {
+      ClothState trial = state;
+      system_.advance(trial, direction, sign * length);
+      const double there = system_.energy(trial);
+      if (!(there < lowest_energy)) continue;
+      lowest_energy = there;
+      lowest = std::move(trial);
+    }
+  }
+  state = std::move(lowest);
+  energy = lowest_energy;
+}
+
 void StableShapeSolver::descend(ClothState& state, CaptureStatistics& statistics) {
   const double tolerance = kDescentTolerance * system_.lightestFreeNodeWeight_N();
   double energy = system_.energy(state), shift = kFirstShift_N_per_m;
   for (int k = 0; k < kDescentSteps; ++k) {
     system_.gradient(state, gradient_);
-    if (gradient_.cwiseAbs().maxCoeff() <= tolerance && shift < kFirstShift_N_per_m) return;
+    const bool still = gradient_.cwiseAbs().maxCoeff() <= tolerance;
+    if (still) shift = 0.0;
     if (!factorizeShifted(state, shift, statistics)) return;
+    if (still && shift == 0.0) return;
+    if (still) leaveRidge(state, energy);
+    if (still) continue;
     step_ = -cholesky_.solve(gradient_);
     ++statistics.newton_steps;
     shift *= lineSearch(state, energy) ? kEase : kStiffen;

@@ -20,6 +20,8 @@ class StableShapeSolver {
   bool solve(ClothState& state, CaptureStatistics& statistics);
 
  private:
+  /// From a saddle to lower energy along the softest direction.
+  void leaveRidge(ClothState& state, double& energy);
   void descend(ClothState& state, CaptureStatistics& statistics);
   bool factorizeShifted(const ClothState& state, double& shift, CaptureStatistics& statistics);
   bool lineSearch(ClothState& state, double& energy);
