@@ -8,7 +8,7 @@ namespace tenter::app {
 std::span<const Verb> verbs() {
   static const std::array kVerbs = {
       importVerb(), fitVerb(),  evaluateVerb(), materialVerb(), exportVerb(),
-      drapeVerb(),  twinVerb(), protocolVerb(), versionVerb(),
+      drapeVerb(),  twinVerb(), protocolVerb(), demoVerb(),     versionVerb(),
   };
   return kVerbs;
 }

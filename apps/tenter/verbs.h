@@ -14,6 +14,7 @@ Verb exportVerb();
 Verb drapeVerb();
 Verb twinVerb();
 Verb protocolVerb();
+Verb demoVerb();
 Verb versionVerb();
 
 // Kinds of import, one file each, import_<name>.cpp.
