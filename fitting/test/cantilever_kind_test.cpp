@@ -13,6 +13,7 @@ using kinds::clothParameters;
 using kinds::constantCurve;
 using kinds::jacobianError;
 using kinds::modelNamed;
+using kinds::onlyFree;
 
 constexpr double kLength_m = 0.075, kDensity = 0.1;
 
@@ -88,16 +89,13 @@ TEST(CantileverKindTest, ConvergesForAnyRigidityInAnyOrder) {
 }
 
 TEST(CantileverKindTest, JacobianMatchesFiniteDifferences) {
-  for (const auto& [id, angle_deg] : {std::pair{"stvk", 0.0},
-                                      {"soft", 45.0},
-                                      {"stvk-coupled", 90.0},
-                                      {"springs", 0.0},
-                                      {"springs", 90.0}}) {
+  for (const auto& [id, angle_deg] : {std::pair{"stvk", 90.0}, {"soft", 45.0}, {"springs", 0.0}}) {
     const ClothModel& model = modelNamed(id);
     FitTestOptions options;
     options.equilibrium_tolerance_N = 1e-13;
     auto test = makeFitTest(cantilever(angle_deg), model, options).value();
-    EXPECT_LT(jacobianError(*test, clothParameters(model), 0), kinds::kJacobianTolerance)
+    EXPECT_LT(jacobianError(*test, onlyFree(clothParameters(model), true), 0, 2e-4),
+              kinds::kJacobianTolerance)
         << id << " at " << angle_deg;
   }
 }

@@ -57,6 +57,14 @@ inline ParameterSet clothParameters(const ClothModel& model, double strain_range
   return set;
 }
 
+/// Only the membrane's or only the bending's coefficients are free.
+inline ParameterSet onlyFree(ParameterSet set, bool bending) {
+  const std::size_t membrane = set.model->membrane_components.size();
+  for (std::size_t i = 0; i < set.components.size(); ++i)
+    if ((i >= membrane) != bending) set.components[i].basis = nullptr;
+  return set;
+}
+
 /// Residuals with one coefficient moved by a share of itself.
 inline Eigen::VectorXd movedResiduals(FitTest& test, const ParameterSet& at, int frame,
                                       Eigen::Index j, double share) {
@@ -71,10 +79,12 @@ inline Eigen::VectorXd movedResiduals(FitTest& test, const ParameterSet& at, int
 }
 
 /// Largest error of the Jacobian's columns, each times its coefficient, against central differences
-/// of fourth order, relative to the largest entry of the column. Columns below `floor` of the
+/// of fourth order, relative to the largest entry of the column. Columns below a thousandth of the
 /// largest one are compared with that floor.
-inline double jacobianError(FitTest& test, const ParameterSet& at, int frame, double floor = 1e-3) {
-  constexpr double kShare = 2e-3;
+/// @param share  step; small where strains lie near a curve's last knot, beyond which its
+/// derivatives jump.
+inline double jacobianError(FitTest& test, const ParameterSet& at, int frame, double share = 2e-3) {
+  constexpr double kFloor = 1e-3;
   test.setParameters(at);
   Eigen::VectorXd r;
   Eigen::MatrixXd analytic;
@@ -88,13 +98,13 @@ inline double jacobianError(FitTest& test, const ParameterSet& at, int frame, do
   EXPECT_GT(largest, 0.0) << "nothing moves: this proves nothing";
   double error = 0.0;
   for (Eigen::Index j = 0; j < at.size(); ++j) {
-    const auto difference = [&](double share) {
-      return Eigen::VectorXd(movedResiduals(test, at, frame, j, share) -
-                             movedResiduals(test, at, frame, j, -share));
+    const auto difference = [&](double step) {
+      return Eigen::VectorXd(movedResiduals(test, at, frame, j, step) -
+                             movedResiduals(test, at, frame, j, -step));
     };
     const Eigen::VectorXd numeric =
-        (8.0 * difference(kShare) - difference(2.0 * kShare)) / (12.0 * kShare);
-    const double scale = std::max(analytic.col(j).cwiseAbs().maxCoeff(), floor * largest);
+        (8.0 * difference(share) - difference(2.0 * share)) / (12.0 * share);
+    const double scale = std::max(analytic.col(j).cwiseAbs().maxCoeff(), kFloor * largest);
     error = std::max(error, (numeric - analytic.col(j)).cwiseAbs().maxCoeff() / scale);
   }
   test.setParameters(at);
