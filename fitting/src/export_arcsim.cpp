@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "arcsim_law.h"
@@ -14,106 +15,122 @@ namespace {
 using arcsim::RowWeights;
 using arcsim::Tables;
 
-constexpr int kUnknowns = arcsim::kStretchRows * arcsim::kStretchColumns;
-constexpr double kRidge = 1e-8;      // keeps rows that no sample reaches at the stiffness at rest
+constexpr double kRidge = 1e-3;      // towards the stiffness at rest, where samples say little
 constexpr double kSideWeight = 0.1;  // of strains that are not those of one component alone
-constexpr int kSweeps = 20000;
+constexpr double kFloor = 0.5;       // of the smallest measured stiffness: rows stay definite
+constexpr int kSweeps = 2000;
 constexpr double kSettled = 1e-14;
 constexpr int kDirections = 5, kDirectionSamples = 16;
 
-/// Squares of relative stress errors as a function of the 24 entries of the stretching table.
-struct Squares {
-  Eigen::Matrix<double, kUnknowns, kUnknowns> matrix =
-      Eigen::Matrix<double, kUnknowns, kUnknowns>::Zero();
-  Eigen::Matrix<double, kUnknowns, 1> right = Eigen::Matrix<double, kUnknowns, 1>::Zero();
+using Entries = Eigen::Matrix<double, arcsim::kStretchRows, 1>;
 
-  void add(const Vec3& green, const Vec3& stress, double weight) {
-    const double size = stress.norm();
-    if (size <= 0.0) return;
-    const RowWeights rows = arcsim::stretchWeights(green);
-    // Stress components by table column: k11 E_uu + k12 E_vv, k22 E_vv + k12 E_uu, k33 E_uv.
-    const double by_column[3][arcsim::kStretchColumns] = {{green[0], green[1], 0.0, 0.0},
-                                                          {0.0, green[0], green[1], 0.0},
-                                                          {0.0, 0.0, 0.0, 0.5 * green[2]}};
-    for (int i = 0; i < 3; ++i) {
-      Eigen::Matrix<double, kUnknowns, 1> row;
-      for (int n = 0; n < kUnknowns; ++n) {
-        row[n] = rows[static_cast<std::size_t>(n / arcsim::kStretchColumns)] *
-                 by_column[i][n % arcsim::kStretchColumns] / size;
-      }
+/// Squares of relative stiffness errors as a function of one column of the stretching table, in
+/// units of the stiffness at rest.
+struct Squares {
+  Eigen::Matrix<double, arcsim::kStretchRows, arcsim::kStretchRows> matrix;
+  Entries right;
+  double scale, smallest;
+
+  explicit Squares(double entry_at_rest)
+      : matrix(kRidge * decltype(matrix)::Identity()),
+        right(Entries::Constant(kRidge)),
+        scale(entry_at_rest),
+        smallest(entry_at_rest) {}
+
+  /// `stiffness` is what the program's doubled table must give at this strain. Both of its ways
+  /// count, through its grid and, as a finer one would, without.
+  void add(const Vec3& green, double stiffness, double weight) {
+    if (stiffness <= 0.0) return;
+    smallest = std::min(smallest, 0.5 * stiffness);
+    for (const RowWeights& rows :
+         {arcsim::stretchWeights(green), arcsim::stretchWeightsDirect(green)}) {
+      const Entries row = scale / stiffness * Eigen::Map<const Entries>(rows.data());
       matrix += weight * row * row.transpose();
-      right += weight * row * (stress[i] / size);
+      right += weight * row;
     }
+  }
+
+  /// Minimum over entries above a floor, by cyclic descent.
+  Entries minimum() const {
+    const double floor = kFloor * smallest / scale;
+    Entries x = Entries::Ones();
+    for (int sweep = 0; sweep < kSweeps; ++sweep) {
+      double moved = 0.0;
+      for (Eigen::Index n = 0; n < x.size(); ++n) {
+        const double slope = right[n] - matrix.row(n).dot(x);
+        const double next = std::max(x[n] + slope / matrix(n, n), floor);
+        moved = std::max(moved, std::abs(next - x[n]));
+        x[n] = next;
+      }
+      if (moved < kSettled) break;
+    }
+    return scale * x;
   }
 };
 
-/// Minimum over entries >= 0, which the program would cut off otherwise, by cyclic descent; scaled
-/// so that all entries near `start` weigh alike.
-Eigen::Matrix<double, kUnknowns, 1> nonNegativeMinimum(Squares squares,
-                                                       Eigen::Matrix<double, kUnknowns, 1> start) {
-  const double scale = std::max(start.maxCoeff(), 1e-300);
-  for (int n = 0; n < kUnknowns; ++n) {
-    const double ridge = kRidge / (scale * scale);
-    squares.matrix(n, n) += ridge;
-    squares.right[n] += ridge * start[n];
-  }
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    double moved = 0.0;
-    for (int n = 0; n < kUnknowns; ++n) {
-      const double slope = squares.right[n] - squares.matrix.row(n).dot(start);
-      const double next = std::max(start[n] + slope / squares.matrix(n, n), 0.0);
-      moved = std::max(moved, std::abs(next - start[n]));
-      start[n] = next;
-    }
-    if (moved < kSettled * scale) break;
-  }
-  return start;
+/// The table's column, by our component: c11, c22, c33.
+constexpr int kColumn[] = {0, 2, 3};
+constexpr int kCoupling = 1;
+
+/// Coupling S_uu / E_vv [N/m] at rest, which the table holds as 2 c12; never negative.
+double couplingOf(const SheetResponse& response) {
+  constexpr double kSmall = 1e-6;
+  return std::max(response.stress_N_per_m(Vec3(0.0, kSmall, 0.0))[0] / kSmall, 0.0);
 }
 
-/// Stretch along one direction, sides held, as far as every component stays measured.
-void addDirections(const SheetResponse& response, Squares& squares) {
+/// What the program's k of a component must be at a strain, by its own formula of stress.
+double neededStiffness(const SheetResponse& response, int component, double coupling,
+                       const Vec3& green) {
+  const Vec3 stress = response.stress_N_per_m(green);
+  if (component == 2) return stress[2] / (0.5 * green[2]);
+  return (stress[component] - coupling * green[1 - component]) / green[component];
+}
+
+/// Largest stretch along a direction, sides held, at which every component stays measured.
+double measuredLimit(const SheetResponse& response, const Vec3& direction) {
+  double limit = std::numeric_limits<double>::infinity();
+  for (int component = 0; component < 3; ++component) {
+    const double end =
+        response.greenOf(component, response.window(kMembraneNames[component]).max)[component];
+    if (direction[component] > 1e-9) limit = std::min(limit, end / direction[component]);
+  }
+  return limit;
+}
+
+void addDirections(const SheetResponse& response, int component, double coupling,
+                   Squares& squares) {
   for (int d = 0; d < kDirections; ++d) {
     const double angle = d * std::numbers::pi / 8.0;
     const double c = std::cos(angle), s = std::sin(angle);
     const Vec3 direction(c * c, s * s, 2.0 * c * s);
-    double limit = 1e300;
-    for (int component = 0; component < 3; ++component) {
-      const double end =
-          response.greenOf(component, response.window(kMembraneNames[component]).max)[component];
-      if (direction[component] > 1e-9) limit = std::min(limit, end / direction[component]);
-    }
+    if (direction[component] < 1e-9) continue;
+    const double limit = measuredLimit(response, direction);
     for (int i = 1; i <= kDirectionSamples; ++i) {
       const Vec3 green = limit * i / kDirectionSamples * direction;
-      squares.add(green, response.stress_N_per_m(green), kSideWeight);
+      squares.add(green, neededStiffness(response, component, coupling, green), kSideWeight);
     }
   }
 }
 
-/// Entries for the stiffness at rest in every row.
-Eigen::Matrix<double, kUnknowns, 1> atRest(const SheetResponse& response) {
-  constexpr double kSmall = 1e-6;
-  const auto stiffness = [&](int strained, int stressed) {
-    Vec3 green = Vec3::Zero();
-    green[strained] = kSmall;
-    return std::max(response.stress_N_per_m(green)[stressed] / kSmall, 0.0);
-  };
-  // The program doubles; its shear stress is k33 E_uv = k33 (2 E_uv) / 2.
-  const Eigen::Vector4d row(0.5 * stiffness(0, 0), 0.5 * stiffness(1, 0), 0.5 * stiffness(1, 1),
-                            stiffness(2, 2));
-  return row.replicate<arcsim::kStretchRows, 1>();
+Entries columnOf(const SheetResponse& response, int component, double coupling) {
+  const Vec3 nearly_rest = 1e-6 * Vec3::Unit(component);
+  const double at_rest = 0.5 * neededStiffness(response, component, coupling, nearly_rest);
+  Squares squares(std::max(at_rest, 1e-12));
+  for (const auto& sample : response.membraneSamples()) {
+    if (sample.component != component) continue;
+    squares.add(sample.green, neededStiffness(response, component, coupling, sample.green), 1.0);
+  }
+  addDirections(response, component, coupling, squares);
+  return squares.minimum();
 }
 
 Tables tablesOf(const SheetResponse& response) {
-  Squares squares;
-  for (const auto& sample : response.membraneSamples()) {
-    squares.add(sample.green, sample.stress, 1.0);
-  }
-  addDirections(response, squares);
-  const auto entries = nonNegativeMinimum(squares, atRest(response));
   Tables tables;
   tables.density_kg_per_m2 = response.material().areal_density_kg_per_m2;
-  for (int n = 0; n < kUnknowns; ++n) {
-    tables.stretching(n / arcsim::kStretchColumns, n % arcsim::kStretchColumns) = entries[n];
+  const double coupling = couplingOf(response);
+  tables.stretching.col(kCoupling).setConstant(0.5 * coupling);
+  for (int component = 0; component < 3; ++component) {
+    tables.stretching.col(kColumn[component]) = columnOf(response, component, coupling);
   }
   for (int row = 0; row < arcsim::kBendRows; ++row) {
     // An edge resists the curvature across it.
