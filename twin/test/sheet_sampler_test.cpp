@@ -14,10 +14,13 @@ constexpr double kRounding = 1e-14;
 
 class SheetSamplerTest : public testing::TestWithParam<DiagonalPattern> {
  protected:
-  SheetSamplerTest() : lines_{linesThrough(0.0, 0.1, 13, {0.005, 0.093}), linesThrough(0.0, 0.1, 11, {0.031}), GetParam()} {
+  SheetSamplerTest()
+      : lines_{linesThrough(0.0, 0.1, 13, {0.005, 0.093}), linesThrough(0.0, 0.1, 11, {0.031}),
+               GetParam()} {
     RandomNumbers random(7, "places");
     places_.resize(2, 500);
-    for (Eigen::Index p = 0; p < places_.cols(); ++p) places_.col(p) = 0.1 * Vec2(random.uniform(), random.uniform());
+    for (Eigen::Index p = 0; p < places_.cols(); ++p)
+      places_.col(p) = 0.1 * Vec2(random.uniform(), random.uniform());
     places_.col(0) << 0.1, 0.1;
     places_.col(1) << 0.0, 0.0;
   }
@@ -27,7 +30,8 @@ class SheetSamplerTest : public testing::TestWithParam<DiagonalPattern> {
     Points3 out(3, static_cast<Eigen::Index>(lines_.u_lines.size() * lines_.v_lines.size()));
     for (std::size_t j = 0; j < lines_.v_lines.size(); ++j) {
       for (std::size_t i = 0; i < lines_.u_lines.size(); ++i) {
-        out.col(lines_.node(static_cast<int>(i), static_cast<int>(j))) = f(lines_.u_lines[i], lines_.v_lines[j]);
+        out.col(lines_.node(static_cast<int>(i), static_cast<int>(j))) =
+            f(lines_.u_lines[i], lines_.v_lines[j]);
       }
     }
     return out;
@@ -49,7 +53,9 @@ class SheetSamplerTest : public testing::TestWithParam<DiagonalPattern> {
 };
 
 TEST_P(SheetSamplerTest, BothReproduceFlatSheets) {
-  const auto flat = [](double x, double y) { return Vec3(1.1 * x - 0.2 * y, 0.3 * x + y, 0.01 + 0.5 * x); };
+  const auto flat = [](double x, double y) {
+    return Vec3(1.1 * x - 0.2 * y, 0.3 * x + y, 0.01 + 0.5 * x);
+  };
   EXPECT_LT(worst(Sampling::kLinear, flat), kRounding);
   EXPECT_LT(worst(Sampling::kCubic, flat), kRounding);
 }
@@ -75,7 +81,8 @@ TEST_P(SheetSamplerTest, LinearFollowsTheTriangles) {
     double expected = 0.0;
     for (const Triangle& t : sheet.rest.triangles) {
       Mat2 edges;
-      edges << sheet.rest.uv.col(t[1]) - sheet.rest.uv.col(t[0]), sheet.rest.uv.col(t[2]) - sheet.rest.uv.col(t[0]);
+      edges << sheet.rest.uv.col(t[1]) - sheet.rest.uv.col(t[0]),
+          sheet.rest.uv.col(t[2]) - sheet.rest.uv.col(t[0]);
       const Vec2 st = edges.inverse() * (places_.col(p) - sheet.rest.uv.col(t[0]));
       const Vec3 shares(1.0 - st.sum(), st[0], st[1]);
       if (shares.minCoeff() < 0.0) continue;

@@ -31,12 +31,15 @@ void expectConsistent(const StrainLaw& law, const Vec3& strain, const Vec3& scal
   for (int i = 0; i < 3; ++i) {
     const Vec3 direction = Vec3::Unit(i);
     const double h = 1e-4 * scale[i];
-    stress[i] = derivative([&](double d) { return law.evaluate(strain + d * direction, 0).energy; }, h);
+    stress[i] =
+        derivative([&](double d) { return law.evaluate(strain + d * direction, 0).energy; }, h);
     for (int j = 0; j < 3; ++j) {
-      tangent(j, i) = derivative([&](double d) { return law.evaluate(strain + d * direction, 0).stress[j]; }, h);
+      tangent(j, i) = derivative(
+          [&](double d) { return law.evaluate(strain + d * direction, 0).stress[j]; }, h);
     }
   }
-  // Relative to the work over the scale of each strain, since the components differ by orders of magnitude.
+  // Relative to the work over the scale of each strain, since the components differ by orders of
+  // magnitude.
   const Vec3 work = stress.cwiseProduct(scale);
   ASSERT_GT(at.stress.norm(), 0.0);
   EXPECT_LT((at.stress.cwiseProduct(scale) - work).norm(), kDerivativeTolerance * work.norm());
@@ -61,7 +64,8 @@ class SpecimenLawTest : public testing::TestWithParam<int> {
 TEST_P(SpecimenLawTest, MembraneStressAndTangentAreDerivativesOfTheEnergy) {
   const SpecimenMembraneLaw law(fabric().membrane);
   const Vec3 scale = membraneScale(fabric());
-  for (int k = 0; k < kStates; ++k) expectConsistent(law, random_.normal3().cwiseProduct(scale), scale);
+  for (int k = 0; k < kStates; ++k)
+    expectConsistent(law, random_.normal3().cwiseProduct(scale), scale);
 }
 
 TEST_P(SpecimenLawTest, MembraneGoesOnSmoothlyBeyondItsLimits) {
@@ -69,7 +73,8 @@ TEST_P(SpecimenLawTest, MembraneGoesOnSmoothlyBeyondItsLimits) {
   const Vec3 scale = membraneScale(fabric());
   for (int k = 0; k < kStates; ++k) {
     expectConsistent(law, 30.0 * random_.normal3().cwiseProduct(scale), scale);
-    expectConsistent(law, Vec3(-0.5 - 0.1 * random_.uniform(), -0.49, random_.normal()), Vec3::Constant(0.1));
+    expectConsistent(law, Vec3(-0.5 - 0.1 * random_.uniform(), -0.49, random_.normal()),
+                     Vec3::Constant(0.1));
   }
   EXPECT_TRUE(std::isfinite(law.evaluate(Vec3::Constant(1e6), 0).energy));
 }
@@ -96,7 +101,8 @@ TEST_P(SpecimenLawTest, MembraneCouplesItsStrains) {
 TEST_P(SpecimenLawTest, BendingStressAndTangentAreDerivativesOfTheEnergy) {
   const SpecimenBendingLaw law(fabric().bending);
   const Vec3 scale = Vec3::Constant(100.0);
-  for (int k = 0; k < kStates; ++k) expectConsistent(law, random_.normal3().cwiseProduct(scale), scale);
+  for (int k = 0; k < kStates; ++k)
+    expectConsistent(law, random_.normal3().cwiseProduct(scale), scale);
 }
 
 TEST_P(SpecimenLawTest, BendingSoftensButStaysStable) {
@@ -173,7 +179,8 @@ std::string fabricName(const testing::TestParamInfo<int>& parameter) {
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryFabric, SpecimenLawTest, testing::Range(0, static_cast<int>(fabrics().size())), fabricName);
+INSTANTIATE_TEST_SUITE_P(EveryFabric, SpecimenLawTest,
+                         testing::Range(0, static_cast<int>(fabrics().size())), fabricName);
 
 }  // namespace
 }  // namespace tenter
