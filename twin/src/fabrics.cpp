@@ -47,7 +47,7 @@ Fabric knit() {
                 .fung_cross = 0.8};
   f.bending = {
       .rigidity_N_m = {2.0e-6, 2.0e-6, 0.9e-6}, .floor = 0.8, .knee_per_m = 150.0, .poisson = 0.15};
-  f.friction = {.yield_N_per_m = {1.9, 1.9, 0.5}, .slip_strain = {0.02, 0.02, 0.03}};
+  f.friction = {.yield_N_per_m = {2.3, 2.3, 0.5}, .slip_strain = {0.02, 0.02, 0.03}};
   f.limits = {.stretch_weft_N = 2.6,
               .stretch_warp_N = 2.6,
               .shear_N = 0.7,
@@ -85,7 +85,7 @@ Fabric wool() {
            .description = "wool and cotton: 10 times stiffer along the warp, 13 times in bending"};
   f.areal_density_kg_per_m2 = 0.24;
   f.thickness_m = 0.50e-3;
-  f.membrane = {.base_N_per_m = {270.0, 4700.0, 14.0},
+  f.membrane = {.base_N_per_m = {270.0, 5700.0, 14.0},
                 .poisson = 0.15,
                 .fung_N_per_m = 8.0,
                 .fung_exponent = {12.0, 190.0, 2.5},

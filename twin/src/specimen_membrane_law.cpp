@@ -71,7 +71,9 @@ LawValue SpecimenMembraneLaw::evaluate(const Vec3& strain, int /*element*/) cons
   const double half = 0.5 * c_.fung_N_per_m;
   out.energy += half * f.value;
   out.stress += half * f.first * slope;
-  out.tangent += half * (f.second * slope * slope.transpose() + 2.0 * f.first * form);
+  // Product first: scaling one factor would cost the last bit of symmetry.
+  const Mat3 square = slope * slope.transpose();
+  out.tangent += half * (f.second * square + 2.0 * f.first * form);
   return out;
 }
 

@@ -39,7 +39,7 @@ class SheetSamplerTest : public testing::TestWithParam<DiagonalPattern> {
 
   template <class F>
   double worst(Sampling sampling, F f) const {
-    const SheetSampler sampler(lines_, places_, sampling, {0.005}, {0.031});
+    const SheetSampler sampler(lines_, places_, sampling, {}, {0.031});
     const Points3 got = sampler.sample(nodes(f));
     double error = 0.0;
     for (Eigen::Index p = 0; p < places_.cols(); ++p) {
