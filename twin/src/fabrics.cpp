@@ -92,7 +92,7 @@ Fabric wool() {
                 .fung_cross = 15.0};
   f.bending = {
       .rigidity_N_m = {2.0e-6, 2.6e-5, 3.6e-6}, .floor = 0.6, .knee_per_m = 90.0, .poisson = 0.10};
-  f.friction = {.yield_N_per_m = {8.0, 9.0, 1.2}, .slip_strain = {0.01, 1.5e-3, 0.03}};
+  f.friction = {.yield_N_per_m = {8.0, 10.5, 1.2}, .slip_strain = {0.01, 1.5e-3, 0.03}};
   f.limits = {.stretch_weft_N = 10.0,
               .stretch_warp_N = 10.0,
               .shear_N = 1.0,
