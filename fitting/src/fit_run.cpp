@@ -15,6 +15,9 @@ constexpr double kOutlierQuantile = 0.005;
 /// Frames a test in the stages before the last: enough for five knots, and three times fewer
 /// equilibria.
 constexpr int kEarlyFrames = 12;
+/// At least this many residuals a test in those stages, or noise passes for knots: strips have one
+/// a frame.
+constexpr int kEarlyResiduals = 40;
 constexpr int kScanFrames = 4;
 /// Stages stop when the cost falls by less than 1 % ([Est12] sec. 5.1); the last pass goes on to
 /// where equilibria are noise.
@@ -97,9 +100,13 @@ std::vector<int> FitRun::allTests() const {
 
 std::vector<FrameId> FitRun::framesOf(const std::vector<int>& tests, int per_test) const {
   std::vector<FrameId> frames;
-  for (const int t : tests)
-    for (const int f : spreadFrames(tests_[t]->frameCount(), per_test))
+  for (const int t : tests) {
+    int wanted = per_test;
+    if (per_test == kEarlyFrames && tests_[t]->frameCount() > 0)
+      wanted = std::max(per_test, kEarlyResiduals / std::max(1, tests_[t]->residualCount(0)));
+    for (const int f : spreadFrames(tests_[t]->frameCount(), wanted))
       if (tests_[t]->residualCount(f) > 0) frames.push_back({t, f});
+  }
   return frames;
 }
 
@@ -198,14 +205,20 @@ void FitRun::addKnots(int group, const std::vector<int>& tests, const OuterOptio
   double cost = last_.cost;
   long residuals = 0;
   for (const int t : tests) residuals += evaluator_.rawResidualCount(t);
+  // Every coefficient takes up a residual's worth of noise; that is no improvement.
+  const auto perFreedom = [&](double value) {
+    const long left = residuals - state_.groups[group].basis->size();
+    return value / static_cast<double>(std::max(1L, left));
+  };
   for (int knots = 2; knots <= options_.max_knots && !evaluator_.cancelled(); ++knots) {
     if (2.0 * cost < kNothingLeft * static_cast<double>(evaluator_.frames().size())) return;
     const FitState before = state_;
+    const double wanted = (1.0 - options_.knot_improvement) * perFreedom(cost);
     state_.setKnots(group, equidistantKnots(range.begin, range.end, knots));
     const bool affordable =
         kResidualsPerCoefficient * state_.groups[group].basis->size() <= residuals;
     const bool better = affordable && solve({group}, tests, kEarlyFrames, outer, name) &&
-                        cost - last_.cost >= options_.knot_improvement * cost;
+                        perFreedom(last_.cost) <= wanted;
     if (!better) {
       state_ = before;
       return;

@@ -15,9 +15,12 @@ namespace {
 constexpr double kRoundingCost = 1e-18;
 /// Smallest relative change of z that is worth another set of equilibria.
 constexpr double kParameterTolerance = 1e-9;
-/// Each rejection shortens the step by twice as much as the last: after five there is nothing to
+/// Each rejection shortens the step by twice as much as the last: after four there is nothing to
 /// gain.
-constexpr int kMaxRejectedSteps = 5;
+constexpr int kMaxRejectedSteps = 4;
+/// A rejection after a step that gained less than this share of the cost means that what is left
+/// are jumps between shapes.
+constexpr double kStalledGain = 1e-3;
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -82,14 +85,16 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
   }
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
-    if (iteration.iteration == 0 || iteration.step_is_successful) accept(iteration.iteration);
-    rejected_ = iteration.iteration == 0 || iteration.step_is_successful ? 0 : rejected_ + 1;
+    const bool accepted = iteration.iteration == 0 || iteration.step_is_successful;
+    if (accepted) accept(iteration.iteration);
+    rejected_ = accepted ? 0 : rejected_ + 1;
+    const bool stalled = rejected_ >= kMaxRejectedSteps || (!accepted && gain_ < kStalledGain);
     summary_.iterations = iteration.iteration;
     if (options_.progress) options_.progress(iteration.iteration, summary_.cost);
     if (evaluator_.cancelled()) return ceres::SOLVER_ABORT;
     const bool exact =
         2.0 * summary_.cost < kRoundingCost * static_cast<double>(evaluator_.blocks().size());
-    if (exact || rejected_ >= kMaxRejectedSteps) {
+    if (exact || stalled) {
       summary_.converged = true;
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     }
@@ -100,7 +105,9 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
   void accept(int iteration) {
     evaluator_.accept();
     summary_.z = evaluated_;
-    summary_.cost = evaluator_.cost();
+    const double cost = evaluator_.cost();
+    gain_ = iteration == 0 ? 1.0 : (summary_.cost - cost) / summary_.cost;
+    summary_.cost = cost;
     if (iteration == 0) summary_.initial_cost = summary_.cost;
     summary_.usable = true;
   }
@@ -111,6 +118,7 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
   Eigen::VectorXd trial_, evaluated_;
   bool ok_ = false;
   int rejected_ = 0;
+  double gain_ = 1.0;  ///< Of the last accepted step, as a share of the cost before it.
 };
 
 ceres::Solver::Options solverOptions(const OuterOptions& options, int threads, Driver& driver) {
