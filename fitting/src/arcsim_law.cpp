@@ -134,7 +134,7 @@ Vec3 stress(const Tables& tables, const Vec3& green, bool direct) {
           0.5 * k[3] * green[2]};
 }
 
-double moment_N(const Tables& tables, double edge_angle_rad, double curvature_per_m) {
+double cylinderMoment(const Tables& tables, double edge_angle_rad, double curvature_per_m) {
   // The program folds the angle of the edge into 0 to 90 degrees and halves the curvature.
   const double turn = std::abs(std::remainder(edge_angle_rad, std::numbers::pi));
   const double along = std::clamp(turn * 4.0 / std::numbers::pi, 0.0, 2.0);

@@ -46,6 +46,6 @@ Vec3 stress(const Tables& tables, const Vec3& green, bool direct = false);
 
 /// Moment per width [N] of a cylinder of curvature kappa whose hinges lie at `edge_angle_rad` from
 /// weft.
-double moment_N(const Tables& tables, double edge_angle_rad, double curvature_per_m);
+double cylinderMoment(const Tables& tables, double edge_angle_rad, double curvature_per_m);
 
 }  // namespace tenter::arcsim

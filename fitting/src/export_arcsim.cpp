@@ -75,13 +75,13 @@ constexpr int kCoupling = 1;
 /// Coupling S_uu / E_vv [N/m] at rest, which the table holds as 2 c12; never negative.
 double couplingOf(const SheetResponse& response) {
   constexpr double kSmall = 1e-6;
-  return std::max(response.stress_N_per_m(Vec3(0.0, kSmall, 0.0))[0] / kSmall, 0.0);
+  return std::max(response.membraneStress(Vec3(0.0, kSmall, 0.0))[0] / kSmall, 0.0);
 }
 
 /// What the program's k of a component must be at a strain, by its own formula of stress.
 double neededStiffness(const SheetResponse& response, int component, double coupling,
                        const Vec3& green) {
-  const Vec3 stress = response.stress_N_per_m(green);
+  const Vec3 stress = response.membraneStress(green);
   if (component == 2) return stress[2] / (0.5 * green[2]);
   return (stress[component] - coupling * green[1 - component]) / green[component];
 }
@@ -138,7 +138,7 @@ Tables tablesOf(const SheetResponse& response) {
     for (int column = 0; column < arcsim::kBendColumns; ++column) {
       const double kappa = std::max(2.0 * arcsim::kCurvatureStep_per_m * column, 1e-3);
       tables.bending(row, column) =
-          response.moment_N(fibres, kappa) / kappa / arcsim::kRigidityPerEntry;
+          response.cylinderMoment(fibres, kappa) / kappa / arcsim::kRigidityPerEntry;
     }
   }
   return tables;
@@ -196,7 +196,7 @@ Result<ExportedMaterial> make(const Material& material, const ExportOptions& opt
   setErrors(
       exported, *response, [&](const Vec3& green) { return arcsim::stress(tables, green); },
       [&](double angle, double kappa) {
-        return arcsim::moment_N(tables, angle + 0.5 * std::numbers::pi, kappa);
+        return arcsim::cylinderMoment(tables, angle + 0.5 * std::numbers::pi, kappa);
       });
   noteLosses(exported, material);
   noteWindow(exported, *response);

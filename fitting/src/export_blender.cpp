@@ -54,7 +54,7 @@ double bestBending(const SheetResponse& response) {
   for (int component = 0; component < 2; ++component) {
     for (const double kappa : response.curvatures(kBendNames[component])) {
       shape.push_back(kappa);
-      value.push_back(response.moment_N(0.5 * std::numbers::pi * component, kappa));
+      value.push_back(response.cylinderMoment(0.5 * std::numbers::pi * component, kappa));
     }
   }
   return bestConstant(shape, value);

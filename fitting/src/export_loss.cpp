@@ -61,11 +61,11 @@ void bendingErrors(ExportedMaterial& exported, const SheetResponse& response,
     const auto curvatures = response.curvatures(kBendNames[component]);
     double largest = 0.0;
     for (const double kappa : curvatures) {
-      largest = std::max(largest, std::abs(response.moment_N(angle, kappa)));
+      largest = std::max(largest, std::abs(response.cylinderMoment(angle, kappa)));
     }
     Sum sum;
     for (const double kappa : curvatures) {
-      const double own = response.moment_N(angle, kappa);
+      const double own = response.cylinderMoment(angle, kappa);
       if (std::abs(own) <= kNegligible * largest) continue;
       const double relative = moment(angle, kappa) / own - 1.0;
       sum.add(relative);

@@ -36,7 +36,7 @@ double bestRigidity(const SheetResponse& response, const char* window, double an
   std::vector<double> shape, value;
   for (const double kappa : response.curvatures(window)) {
     shape.push_back(kappa);
-    value.push_back(response.moment_N(angle, kappa));
+    value.push_back(response.cylinderMoment(angle, kappa));
   }
   return bestConstant(shape, value);
 }

@@ -69,14 +69,14 @@ Vec3 SheetResponse::springStress(const Vec3& green) const {
   return stress;
 }
 
-Vec3 SheetResponse::stress_N_per_m(const Vec3& green) const {
+Vec3 SheetResponse::membraneStress(const Vec3& green) const {
   if (springs_) return springStress(green);
   Mat3 by_green;
   const Vec3 strain = lawStrain(green, &by_green);
   return by_green.transpose() * laws_.membrane->evaluate(strain, 0).stress;
 }
 
-double SheetResponse::moment_N(double angle_rad, double curvature_per_m) const {
+double SheetResponse::cylinderMoment(double angle_rad, double curvature_per_m) const {
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   if (!springs_) {
     const Vec3 direction(c * c, s * s, 2.0 * c * s);
@@ -129,7 +129,7 @@ std::vector<SheetResponse::Sample> SheetResponse::membraneSamples() const {
       const double strain = from + (range.max - from) * i / kSamples;
       if (std::abs(strain) < 1e-9) continue;
       const Vec3 green = greenOf(component, strain);
-      samples.push_back({component, strain, green, stress_N_per_m(green)});
+      samples.push_back({component, strain, green, membraneStress(green)});
     }
   }
   return samples;

@@ -17,9 +17,9 @@ class SheetResponse {
   /// Error for laws whose constants belong to one mesh; springs bend only at a known edge length.
   static Result<SheetResponse> create(const Material& material, std::optional<double> edge_m);
 
-  Vec3 stress_N_per_m(const Vec3& green) const;
+  Vec3 membraneStress(const Vec3& green) const;  ///< [N/m].
   /// Moment per width [N] of a cylinder of this curvature, its bent fibres at an angle from weft.
-  double moment_N(double angle_rad, double curvature_per_m) const;
+  double cylinderMoment(double angle_rad, double curvature_per_m) const;
   bool bends() const { return bends_; }
 
   /// Green strain of one component alone, at a strain as the law measures it.
