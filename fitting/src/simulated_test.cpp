@@ -13,6 +13,7 @@ constexpr double kSameShape = 1e-3;
 /// A warm start that takes longer than this is no better than a cold one.
 constexpr int kWarmIterations = 30;
 constexpr int kColdIterations = 300;
+constexpr int kRetryIterations = 100;
 
 std::shared_ptr<const StrainLaw> noLaw() {
   const StiffnessCurve zero = StiffnessCurve::constant(0.0);
@@ -183,7 +184,13 @@ Eigen::MatrixXd SimulatedTest::solve(Simulation& simulation, int index, bool wit
         solveFrom(simulation, warmStarts(simulation, frame.accepted), kWarmIterations, fresh.state);
     if (!outcome.converged) {
       const FrameOutcome warm = outcome;
-      outcome = solveFrom(simulation, coldStarts(simulation, index), kColdIterations, fresh.state);
+      // A frame that had a state and loses it says that the point is bad: the outer loop steps back
+      // from it, so it is tried again once and not for hundreds of iterations from everywhere.
+      const bool had_state = frame.accepted.generation >= 0;
+      std::vector<ClothState> starts = coldStarts(simulation, index);
+      if (had_state) starts.resize(1);
+      outcome = solveFrom(simulation, std::move(starts),
+                          had_state ? kRetryIterations : kColdIterations, fresh.state);
       outcome.newton_steps += warm.newton_steps;
       outcome.factorizations += warm.factorizations;
     }
