@@ -83,7 +83,7 @@ void finish(FitRun& run, const std::vector<Measurement>& measurements, const Fit
   const FitSpace space = run.evaluator().space();
   const Eigen::VectorXd z = run.last().z;
   FitStatistics statistics;
-  if (settled) statistics = fitStatistics(run.evaluator(), z);
+  if (settled) statistics = fitStatistics(run.evaluator(), run.blocks(), z);
   const FitStatistics* known = settled ? &statistics : nullptr;
   result.material = materialOf(run, run.state(), space, known, z, measurements, options);
   judgeTests(run, known, result);

@@ -143,4 +143,29 @@ std::vector<int> seenGroups(const FitState& state, const std::vector<TestRole>& 
   return seen;
 }
 
+std::vector<FitBlock> fitBlocks(const FitState& state, const std::vector<TestRole>& roles) {
+  std::vector<FitBlock> blocks;
+  std::vector<bool> placed(roles.size(), false);
+  for (const int seed : stageOrder(state, roles)) {
+    if (std::ranges::any_of(blocks, [&](const FitBlock& b) { return contains(b.groups, seed); }))
+      continue;
+    FitBlock block{.groups = {seed}, .tests = {}};
+    for (bool grown = true; grown;) {
+      grown = false;
+      for (int t = 0; t < static_cast<int>(roles.size()); ++t) {
+        const auto linked = [&](int g) { return sees(roles[t], state.groups[g]); };
+        if (placed[t] || std::ranges::none_of(block.groups, linked)) continue;
+        placed[t] = grown = true;
+        block.tests.push_back(t);
+        for (const int g : seenGroups(state, {roles[t]}))
+          if (!contains(block.groups, g)) block.groups.push_back(g);
+      }
+    }
+    std::ranges::sort(block.groups);
+    std::ranges::sort(block.tests);
+    blocks.push_back(std::move(block));
+  }
+  return blocks;
+}
+
 }  // namespace tenter

@@ -29,4 +29,15 @@ std::vector<int> stageOrder(const FitState& state, const std::vector<TestRole>& 
 /// Groups that some test sees.
 std::vector<int> seenGroups(const FitState& state, const std::vector<TestRole>& roles);
 
+/// Groups and tests that belong together: connected by "this test sees that group".
+struct FitBlock {
+  std::vector<int> groups, tests;
+};
+
+/// Membrane before bending. A test that was made for one component shifts a little with others too
+/// (a sheet that bends under its weight is also stretched by it), but its residuals must not decide
+/// on them ([Est12] sec. 5.1 compares clip-parallel forces for that reason): each block is fitted
+/// to its own tests with the others' curves given, in turn.
+std::vector<FitBlock> fitBlocks(const FitState& state, const std::vector<TestRole>& roles);
+
 }  // namespace tenter

@@ -24,6 +24,11 @@ constexpr int kScanFrames = 4;
 constexpr double kEarlyTolerance = 1e-2;
 constexpr double kFinalTolerance = 1e-6;
 constexpr int kEarlyIterations = 10;
+/// Rounds over the blocks end when none lowers its cost by more than this share.
+constexpr double kSettledGain = 1e-4;
+constexpr int kMaxPasses = 4;
+/// A first guess may be far off; that is not noise.
+constexpr double kLargestMisfit = 100.0;
 /// Ranges narrower than this share of their place hold one knot only.
 constexpr double kNarrowRange = 1e-6;
 /// Sum of squares per residual below which data are met to rounding and knots cannot help.
@@ -128,16 +133,19 @@ bool FitRun::solve(const std::vector<int>& groups, const std::vector<int>& tests
   evaluator_.configure(space, framesOf(tests, per_test));
   const Eigen::VectorXd start = space->start();
   noteDropped(evaluator_.dropFailing(start), stage);
-  if (evaluator_.frames().empty() || space->size() == 0) return false;
+  if (evaluator_.frames().empty() || space->size() == 0 || !evaluator_.evaluate(start))
+    return false;
   long residuals = 0;
   for (const int t : tests) residuals += evaluator_.rawResidualCount(t);
-  OuterOptions with_progress = outer;
-  with_progress.progress = [&](int iteration, double cost) {
+  OuterOptions chosen = outer;
+  chosen.misfit =
+      std::min(kLargestMisfit, 2.0 * evaluator_.cost() / static_cast<double>(residuals));
+  chosen.progress = [&](int iteration, double cost) {
     if (!options_.progress) return;
     options_.progress(
         {stage, iteration, cost, std::sqrt(2.0 * cost / static_cast<double>(residuals))});
   };
-  last_ = solveOuter(evaluator_, start, with_progress);
+  last_ = solveOuter(evaluator_, start, chosen);
   outer_iterations += last_.iterations;
   if (!last_.usable) return false;
   state_ = space->stateAt(last_.z);
@@ -236,24 +244,45 @@ void FitRun::fitGroup(int group) {
   if (!solve({group}, tests, kEarlyFrames, outer, name)) return;
   reweigh(tests);
   if (!solve({group}, tests, kEarlyFrames, outer, name)) return;
+  state_.setConstant(group, state_.groups[group].coefficients[0]);
   if (!options_.variant.linear && !state_.groups[group].constant_only)
     addKnots(group, tests, outer);
 }
 
-bool FitRun::refine() {
-  refined_ = seenGroups(state_, roles_);
-  if (refined_.empty() || evaluator_.cancelled()) return false;
+/// One block on its own tests; true if there is a point to go on from.
+bool FitRun::refineBlock(const FitBlock& block, int pass) {
   const OuterOptions early{
       .relative_tolerance = kEarlyTolerance, .max_iterations = kEarlyIterations, .progress = {}};
-  reweigh(allTests());
-  if (!solve(refined_, allTests(), kEarlyFrames, early, "refinement")) return false;
-  if (evaluator_.cancelled()) return true;
-  reweigh(allTests());
   const OuterOptions tight{.relative_tolerance = kFinalTolerance,
                            .max_iterations = options_.max_outer_iterations,
                            .progress = {}};
-  if (!solve(refined_, allTests(), 0, tight, "all frames")) return false;
-  converged = last_.converged;
+  if (pass == 0) {
+    reweigh(block.tests);
+    if (!solve(block.groups, block.tests, kEarlyFrames, early, "refinement")) return false;
+    if (evaluator_.cancelled()) return true;
+    reweigh(block.tests);
+  }
+  return solve(block.groups, block.tests, 0, tight, "all frames");
+}
+
+/// Block after block, until a round changes nothing any more: what one block gives, the next takes
+/// as given.
+bool FitRun::refine() {
+  refined_ = seenGroups(state_, roles_);
+  blocks_ = fitBlocks(state_, roles_);
+  if (blocks_.empty()) return false;
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    bool settled = true, all_converged = true;
+    for (const FitBlock& block : blocks_) {
+      if (evaluator_.cancelled()) return true;
+      if (!refineBlock(block, pass)) return false;
+      all_converged = all_converged && last_.converged;
+      settled = settled && last_.initial_cost - last_.cost <= kSettledGain * last_.initial_cost;
+    }
+    converged = all_converged && !evaluator_.cancelled();
+    complete_ = true;
+    if (settled) return true;
+  }
   return true;
 }
 
@@ -271,14 +300,14 @@ bool FitRun::run() {
 
 bool FitRun::settle() {
   if (!last_.usable) return false;
-  const bool complete = !refined_.empty() && evaluator_.space().groups() == refined_;
-  if (!complete) {
+  if (!complete_) {
     refined_ = seenGroups(state_, roles_);
-    const auto space = std::make_shared<FitSpace>(state_, refined_);
-    evaluator_.configure(space, framesOf(allTests(), kEarlyFrames));
-    last_.z = space->start();
-    evaluator_.dropFailing(last_.z);
+    blocks_ = fitBlocks(state_, roles_);
   }
+  const auto space = std::make_shared<FitSpace>(state_, refined_);
+  evaluator_.configure(space, framesOf(allTests(), complete_ ? 0 : kEarlyFrames));
+  last_.z = space->start();
+  noteDropped(evaluator_.dropFailing(last_.z), "the statistics");
   if (evaluator_.frames().empty() || !evaluator_.evaluate(last_.z, false)) return false;
   evaluator_.accept();
   return true;
@@ -288,6 +317,7 @@ bool FitRun::refit(FitState start, const std::vector<int>& groups, int max_itera
                    double tolerance) {
   state_ = std::move(start);
   refined_ = groups;
+  complete_ = false;
   const OuterOptions outer{
       .relative_tolerance = tolerance, .max_iterations = max_iterations, .progress = {}};
   if (!solve(refined_, allTests(), kEarlyFrames, outer, "alternative law")) return false;

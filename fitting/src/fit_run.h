@@ -38,14 +38,16 @@ class FitRun {
   /// For alternatives of the law.
   bool refit(FitState start, const std::vector<int>& groups, int max_iterations, double tolerance);
 
-  /// Brings the tests to the best point: of the last pass, or, if that never came, of everything
-  /// that the stages found.
+  /// Brings the tests to the best point, with derivatives by everything that was fitted; on a few
+  /// frames only if the refinement did not come to its end.
   bool settle();
 
   const FitState& state() const { return state_; }
   const std::vector<TestRole>& roles() const { return roles_; }
   FrameEvaluator& evaluator() { return evaluator_; }
   const std::vector<int>& refinedGroups() const { return refined_; }
+  /// Which groups are fitted to which tests (empty before the refinement).
+  const std::vector<FitBlock>& blocks() const { return blocks_; }
   const OuterSummary& last() const { return last_; }
   StrainRange rangeOf(int component, const std::vector<int>& tests) const;
 
@@ -62,6 +64,7 @@ class FitRun {
   void addKnots(int group, const std::vector<int>& tests, const OuterOptions& outer);
   const std::vector<double>* givenKnots(int group) const;
   bool refine();
+  bool refineBlock(const FitBlock& block, int pass);
   void reweigh(const std::vector<int>& tests);
   void noteDropped(int dropped, const std::string& stage);
   std::vector<int> allTests() const;
@@ -72,6 +75,8 @@ class FitRun {
   FitState state_;
   FrameEvaluator evaluator_;
   std::vector<int> refined_;
+  std::vector<FitBlock> blocks_;
+  bool complete_ = false;  ///< All blocks were refined on all frames.
   OuterSummary last_;
 };
 

@@ -50,6 +50,7 @@ void FitState::setConstant(int group, double stiffness) {
   ParameterGroup& g = groups[group];
   g.basis = std::make_shared<SplineBasis>(SplineBasis::constant(g.even));
   g.coefficients = Eigen::VectorXd::Constant(1, stiffness);
+  g.belief = stiffness;
   updateReference(group);
 }
 
@@ -140,27 +141,21 @@ FitState FitSpace::stateAt(const Eigen::VectorXd& z) const {
   return state;
 }
 
-bool FitSpace::moves(int component, const std::vector<int>& observed) const {
-  return offsets_[state_.groupOf(component)] >= 0 &&
-         std::ranges::find(observed, component) != observed.end();
-}
-
-ParameterSet FitSpace::parameters(const Eigen::VectorXd& z,
-                                  const std::vector<int>& observed) const {
+ParameterSet FitSpace::parameters(const Eigen::VectorXd& z) const {
   const FitState state = stateAt(z);
   ParameterSet set{.model = state.model, .components = {}};
   for (int c = 0; c < state.model->componentCount(); ++c) {
     set.components.push_back(state.componentCurve(c));
-    if (!moves(c, observed)) set.components.back().basis = nullptr;
+    if (!moves(c)) set.components.back().basis = nullptr;
   }
   return set;
 }
 
-Eigen::MatrixXd FitSpace::ties(const std::vector<int>& observed) const {
+Eigen::MatrixXd FitSpace::ties() const {
   std::vector<int> moving;
   int rows = 0;
   for (int c = 0; c < state_.model->componentCount(); ++c) {
-    if (!moves(c, observed)) continue;
+    if (!moves(c)) continue;
     moving.push_back(c);
     rows += state_.groups[state_.groupOf(c)].basis->size();
   }

@@ -21,6 +21,8 @@ struct ParameterGroup {
   std::shared_ptr<const SplineBasis> basis = std::make_shared<SplineBasis>(SplineBasis::constant());
   Eigen::VectorXd coefficients = Eigen::VectorXd::Zero(1);
   double reference = 1.0;  ///< Stiffness that makes the solver's numbers O(1).
+  double belief =
+      0.0;  ///< Best constant known so far: what a curve is taken for where no data say.
 };
 
 /// What a fit knows so far: one curve a group.
@@ -57,13 +59,12 @@ class FitSpace {
   std::vector<std::string> labels() const;  ///< "stretch_weft[3]".
   FitState stateAt(const Eigen::VectorXd& z) const;
 
-  /// Laws at z with parameters for the active components among `observed` alone, and T: parameters
-  /// = T z.
-  ParameterSet parameters(const Eigen::VectorXd& z, const std::vector<int>& observed) const;
-  Eigen::MatrixXd ties(const std::vector<int>& observed) const;
+  /// Laws at z with parameters for the components of active groups alone, and T: parameters = T z.
+  ParameterSet parameters(const Eigen::VectorXd& z) const;
+  Eigen::MatrixXd ties() const;
 
  private:
-  bool moves(int component, const std::vector<int>& observed) const;
+  bool moves(int component) const { return offsets_[state_.groupOf(component)] >= 0; }
 
   FitState state_;
   std::vector<int> active_;

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit_statistics.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-
-#include "outer_solver.h"
 
 namespace tenter {
 namespace {
@@ -17,11 +15,24 @@ constexpr double kAtBound = 1e-9;
 constexpr double kSmallKnot = 0.05;
 /// Terms of a combination lighter than this are not listed.
 constexpr double kLightTerm = 0.1;
-constexpr double kPriorInformation = 1.0 / (kPriorRelativeStd * kPriorRelativeStd);
 
-std::vector<TestInformation> gather(const FrameEvaluator& evaluator) {
-  const int n = evaluator.space().size();
+/// Keeps the equations of z regular where no data speak. The belief that a fit goes by is left out:
+/// a band says what was measured.
+Eigen::MatrixXd vagueInformation(int size) {
+  return Eigen::MatrixXd::Identity(size, size) / (kVagueRelativeStd * kVagueRelativeStd);
+}
+
+std::vector<TestInformation> gather(const FrameEvaluator& evaluator,
+                                    const std::vector<FitBlock>& blocks) {
+  const FitSpace& space = evaluator.space();
+  const int n = space.size();
   std::vector<TestInformation> tests(evaluator.tests().size());
+  for (TestInformation& test : tests) test.own = Eigen::VectorXd::Zero(n);
+  for (const FitBlock& block : blocks)
+    for (const int t : block.tests)
+      for (const int g : block.groups)
+        if (space.offset(g) >= 0)
+          tests[t].own.segment(space.offset(g), space.state().groups[g].basis->size()).setOnes();
   for (std::size_t t = 0; t < tests.size(); ++t) {
     tests[t].normal = Eigen::MatrixXd::Zero(n, n);
     tests[t].gradient = Eigen::VectorXd::Zero(n);
@@ -44,17 +55,19 @@ std::vector<bool> entriesAtBound(const FitSpace& space, const Eigen::VectorXd& z
   return at_bound;
 }
 
-/// Rows and columns of held entries out of the way: unit diagonal, which the caller strips again.
-Eigen::MatrixXd inverseOfFree(Eigen::MatrixXd information, const std::vector<bool>& held) {
-  const auto n = information.rows();
-  information.diagonal().array() += kPriorInformation;
+/// Inverse on the entries that are free; rows and columns of held ones are zero. Entries differ by
+/// many decades in how well they are known, so the matrix is scaled first.
+Eigen::MatrixXd inverseOfFree(Eigen::MatrixXd equations, const std::vector<bool>& held) {
+  const auto n = equations.rows();
   for (Eigen::Index i = 0; i < n; ++i)
     if (held[i]) {
-      information.row(i).setZero();
-      information.col(i).setZero();
-      information(i, i) = 1.0;
+      equations.row(i).setZero();
+      equations.col(i).setZero();
+      equations(i, i) = 1.0;
     }
-  Eigen::MatrixXd inverse = information.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::VectorXd scale = equations.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * equations * scale.asDiagonal();
+  Eigen::MatrixXd inverse = scale.asDiagonal() * scaled.fullPivLu().inverse() * scale.asDiagonal();
   for (Eigen::Index i = 0; i < n; ++i)
     if (held[i]) inverse(i, i) = 0.0;
   return inverse;
@@ -62,22 +75,23 @@ Eigen::MatrixXd inverseOfFree(Eigen::MatrixXd information, const std::vector<boo
 
 }  // namespace
 
-FitStatistics fitStatistics(const FrameEvaluator& evaluator, const Eigen::VectorXd& z) {
+FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<FitBlock>& blocks,
+                            const Eigen::VectorXd& z) {
   FitStatistics statistics;
-  statistics.tests = gather(evaluator);
+  statistics.tests = gather(evaluator, blocks);
   statistics.at_bound = entriesAtBound(evaluator.space(), z);
-  const auto n = z.size();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n, n);
-  for (const TestInformation& test : statistics.tests) information += test.normal;
-  const Eigen::MatrixXd inverse = inverseOfFree(information, statistics.at_bound);
+  Eigen::MatrixXd equations = vagueInformation(evaluator.space().size());
+  Eigen::MatrixXd noise = equations;
+  for (const TestInformation& test : statistics.tests) equations += test.equations();
+  const Eigen::MatrixXd inverse = inverseOfFree(equations, statistics.at_bound);
 
-  Eigen::MatrixXd widened = kPriorInformation * Eigen::MatrixXd::Identity(n, n);
   for (TestInformation& test : statistics.tests) {
-    const double taken = (inverse * test.normal).trace();
+    const double taken = (inverse * test.equations()).trace();
     test.chi2_per_dof = test.chi2 / std::max(1.0, test.residuals - taken);
-    widened += std::max(1.0, test.chi2_per_dof) * test.normal;
+    noise += std::max(1.0, test.chi2_per_dof) * test.equations() * test.own.asDiagonal();
   }
-  statistics.covariance = inverse * widened * inverse;
+  const Eigen::MatrixXd covariance = inverse * noise * inverse.transpose();
+  statistics.covariance = 0.5 * (covariance + covariance.transpose());
   return statistics;
 }
 
@@ -155,17 +169,19 @@ std::vector<Specimen> specimenSteps(const FrameEvaluator& evaluator,
   const Eigen::VectorXd lower = evaluator.space().lowerBounds();
   std::vector<Specimen> specimens;
   for (const std::string& name : unique) {
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(z.size(), z.size());
+    Eigen::MatrixXd equations = vagueInformation(evaluator.space().size()), noise = equations;
     Eigen::VectorXd gradient = Eigen::VectorXd::Zero(z.size());
     for (std::size_t t = 0; t < names.size(); ++t) {
       if (names[t] != name) continue;
       const TestInformation& test = statistics.tests[t];
       const double weight = 1.0 / std::max(1.0, test.chi2_per_dof);
-      normal += weight * test.normal;
-      gradient += weight * test.gradient;
+      equations += weight * test.equations();
+      noise += weight * test.equations() * test.own.asDiagonal();
+      gradient += weight * test.own.cwiseProduct(test.gradient);
     }
-    Specimen specimen{name, z, inverseOfFree(normal, statistics.at_bound)};
-    specimen.z = (z - specimen.covariance * gradient).cwiseMax(lower);
+    const Eigen::MatrixXd inverse = inverseOfFree(equations, statistics.at_bound);
+    Specimen specimen{name, (z - inverse * gradient).cwiseMax(lower),
+                      inverse * noise * inverse.transpose()};
     specimens.push_back(std::move(specimen));
   }
   return specimens;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "fit_roles.h"
 #include "frame_evaluator.h"
 
 namespace tenter {
@@ -13,14 +14,19 @@ namespace tenter {
 /// seen.
 inline constexpr double kSeenRelativeStd = 0.5;
 
-/// Variance of an entry of z (relative to its curve's mean stiffness) from which the weak belief
-/// says more than the data.
-inline constexpr double kUnseenCoefficientVariance = 0.5e6;
+/// Standard deviation of an entry of z (relative to its curve's mean stiffness) that stands for
+/// "not known", and the variance from which an entry counts so.
+inline constexpr double kVagueRelativeStd = 1000.0;
+inline constexpr double kUnseenCoefficientVariance = 0.5 * kVagueRelativeStd * kVagueRelativeStd;
 
 /// Information of one test about z, and how well it is met.
 struct TestInformation {
+  Eigen::VectorXd own;       ///< 1 for entries of z that are fitted to this test, 0 for others.
   Eigen::MatrixXd normal;    ///< Sum of J^T J.
   Eigen::VectorXd gradient;  ///< Sum of J^T r.
+
+  /// Rows: what this test contributes to the equations that determine its own entries.
+  Eigen::MatrixXd equations() const { return own.asDiagonal() * normal; }
   double chi2 = 0.0;
   double residuals = 0.0;  ///< Before compression.
   double chi2_per_dof =
@@ -36,8 +42,9 @@ struct FitStatistics {
       covariance;  ///< Of z; zero at bounds. Misfit beyond the noise widens it, test by test.
 };
 
-/// Of the point that the evaluator evaluated last, with all its blocks valid.
-FitStatistics fitStatistics(const FrameEvaluator& evaluator, const Eigen::VectorXd& z);
+/// Of the point that the evaluator evaluated last, with all its frames valid.
+FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<FitBlock>& blocks,
+                            const Eigen::VectorXd& z);
 
 /// Knot values of a group (in the first member's units), their standard deviations, and whether
 /// they are seen.

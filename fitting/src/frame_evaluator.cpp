@@ -55,9 +55,7 @@ FrameEvaluator::FrameEvaluator(std::vector<FitTest*> tests, int threads,
 void FrameEvaluator::configure(std::shared_ptr<const FitSpace> space, std::vector<FrameId> frames) {
   space_ = std::move(space);
   frames_ = std::move(frames);
-  ties_.clear();
-  for (const FitTest* test : tests_)
-    ties_.push_back(space_->ties(test->observedComponents(*space_->state().model)));
+  ties_ = space_->ties();
   blocks_.assign(frames_.size(), {});
   valid_ = false;
 }
@@ -87,7 +85,7 @@ void FrameEvaluator::evaluateFrame(int index) {
     block.outcome.problem = "residuals are not finite";
     return;
   }
-  block.jacobian.noalias() = by_parameter * ties_[id.test];
+  block.jacobian.noalias() = by_parameter * ties_;
   compress(block.residuals, block.jacobian);
 }
 
@@ -96,9 +94,8 @@ bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
   valid_ = false;
   std::set<int> used;
   for (const FrameId& id : frames_) used.insert(id.test);
-  for (const int t : used)
-    tests_[t]->setParameters(
-        space_->parameters(z, tests_[t]->observedComponents(*space_->state().model)));
+  const ParameterSet parameters = space_->parameters(z);
+  for (const int t : used) tests_[t]->setParameters(parameters);
   for (FrameBlock& block : blocks_) block.outcome = {};
   std::atomic<bool> failed{false};
   parallelFor(

@@ -66,7 +66,7 @@ class FrameEvaluator {
   std::function<bool()> cancelled_;
   std::shared_ptr<const FitSpace> space_;
   std::vector<FrameId> frames_;
-  std::vector<Eigen::MatrixXd> ties_;  ///< A test each.
+  Eigen::MatrixXd ties_;  ///< Parameters by z.
   std::vector<FrameBlock> blocks_;
   Eigen::VectorXd point_;
   bool valid_ = false;

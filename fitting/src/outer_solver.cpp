@@ -18,8 +18,8 @@ constexpr double kParameterTolerance = 1e-9;
 /// Each rejection shortens the step by twice as much as the last: after four there is nothing to
 /// gain.
 constexpr int kMaxRejectedSteps = 4;
-/// A rejection after a step that gained less than this share of the cost means that what is left
-/// are jumps between shapes.
+/// Two steps in a row that gain less than this share of the cost, or one and then a rejection, mean
+/// that what is left are jumps between shapes: a smooth sum of squares converges quadratically.
 constexpr double kStalledGain = 1e-3;
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -88,7 +88,8 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
     const bool accepted = iteration.iteration == 0 || iteration.step_is_successful;
     if (accepted) accept(iteration.iteration);
     rejected_ = accepted ? 0 : rejected_ + 1;
-    const bool stalled = rejected_ >= kMaxRejectedSteps || (!accepted && gain_ < kStalledGain);
+    const bool stalled = rejected_ >= kMaxRejectedSteps || (!accepted && gain_ < kStalledGain) ||
+                         (gain_ < kStalledGain && previous_gain_ < kStalledGain);
     summary_.iterations = iteration.iteration;
     if (options_.progress) options_.progress(iteration.iteration, summary_.cost);
     if (evaluator_.cancelled()) return ceres::SOLVER_ABORT;
@@ -106,6 +107,7 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
     evaluator_.accept();
     summary_.z = evaluated_;
     const double cost = evaluator_.cost();
+    previous_gain_ = gain_;
     gain_ = iteration == 0 ? 1.0 : (summary_.cost - cost) / summary_.cost;
     summary_.cost = cost;
     if (iteration == 0) summary_.initial_cost = summary_.cost;
@@ -118,7 +120,8 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
   Eigen::VectorXd trial_, evaluated_;
   bool ok_ = false;
   int rejected_ = 0;
-  double gain_ = 1.0;  ///< Of the last accepted step, as a share of the cost before it.
+  /// Of the last two accepted steps, as a share of the cost before each.
+  double gain_ = 1.0, previous_gain_ = 1.0;
 };
 
 ceres::Solver::Options solverOptions(const OuterOptions& options, int threads, Driver& driver) {
@@ -138,20 +141,22 @@ ceres::Solver::Options solverOptions(const OuterOptions& options, int threads, D
 
 }  // namespace
 
-Prior weakPrior(const FitSpace& space, const Eigen::VectorXd& around) {
+Prior weakPrior(const FitSpace& space, double misfit) {
   const int n = space.size();
   Prior prior{Eigen::MatrixXd::Zero(2 * n, n), Eigen::VectorXd::Zero(2 * n)};
   prior.matrix.topRows(n).setIdentity();
-  prior.offset.head(n) = around;
   for (const int g : space.groups()) {
-    const SplineBasis& basis = *space.state().groups[g].basis;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(basis.roughness());
+    const ParameterGroup& group = space.state().groups[g];
+    const int begin = space.offset(g), count = group.basis->size();
+    prior.offset.segment(begin, count).setConstant(group.belief / group.reference);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(group.basis->roughness());
     const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-    prior.matrix.block(n + space.offset(g), space.offset(g), basis.size(), basis.size()) =
+    prior.matrix.block(n + begin, begin, count, count) =
         root.asDiagonal() * eigen.eigenvectors().transpose();
   }
-  prior.matrix /= kPriorRelativeStd;
-  prior.offset /= kPriorRelativeStd;
+  const double weight = std::sqrt(misfit) / kPriorRelativeStd;
+  prior.matrix *= weight;
+  prior.offset *= weight;
   return prior;
 }
 
@@ -171,7 +176,7 @@ OuterSummary solveOuter(FrameEvaluator& evaluator, const Eigen::VectorXd& start,
     if (std::isfinite(lower[i])) problem.SetParameterLowerBound(z, i, lower[i]);
   for (int i = 0; i < static_cast<int>(evaluator.frames().size()); ++i)
     problem.AddResidualBlock(new FrameCost(evaluator, i, driver.ok()), nullptr, z);
-  problem.AddResidualBlock(new PriorCost(weakPrior(evaluator.space(), start)), nullptr, z);
+  problem.AddResidualBlock(new PriorCost(weakPrior(evaluator.space(), options.misfit)), nullptr, z);
 
   ceres::Solver::Summary report;
   ceres::Solve(solverOptions(options, evaluator.threads(), driver), &problem, &report);

@@ -7,20 +7,23 @@
 
 namespace tenter {
 
-/// Weak belief that keeps what the data cannot see finite: every coefficient within
-/// kPriorRelativeStd of the group's typical stiffness of where it started, and curves as smooth
-/// ([Est12] has none). Residuals are `matrix` z - `offset`.
+/// Weak belief about what the data cannot see ([Est12] has none): every coefficient within
+/// kPriorRelativeStd of the group's typical stiffness of its best constant, and curves as smooth
+/// (SplineBasis::roughness). It is measured in the noise that the data show: data that are met to
+/// rounding leave nothing of it. Residuals are `matrix` z - `offset`.
 struct Prior {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd offset;
 };
-inline constexpr double kPriorRelativeStd = 1000.0;
-Prior weakPrior(const FitSpace& space, const Eigen::VectorXd& around);
+inline constexpr double kPriorRelativeStd = 2.0;
+/// @param misfit  sum of squares per residual.
+Prior weakPrior(const FitSpace& space, double misfit);
 
 struct OuterOptions {
   double relative_tolerance =
       1e-2;  ///< Stop when the cost falls by less between iterations ([Est12] sec. 5.1).
   int max_iterations = 30;
+  double misfit = 1.0;  ///< Sum of squares per residual, for the weak belief.
   std::function<void(int iteration, double cost)> progress;
 };
 

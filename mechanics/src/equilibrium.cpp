@@ -16,9 +16,17 @@ constexpr double kForceToleranceOfNodeWeight = 1e-4;
 /// Forces are resolved to this many roundings of the positions, times the stiffest degree of
 /// freedom.
 constexpr double kRoundings = 8.0;
+/// Smallest shift of an indefinite Hessian, as a share of its stiffest entry; how it eases after a
+/// full step and stiffens after one that failed.
+constexpr double kLeastShift = 1e-9;
+constexpr double kEase = 0.15, kStiffen = 4.0;
 constexpr double kArmijo = 1e-4;
 constexpr int kMaxBacktracks = 40;
 constexpr int kMaxSaddles = 20;
+constexpr int kInverseIterations = 6;
+constexpr double kGoldenAngle = 2.399963;  ///< Starts inverse iteration without a symmetry.
+/// Moves off a saddle, as shares of the sheet's size.
+constexpr double kFirstEscape = 1e-5, kLastEscape = 0.2;
 constexpr int kWatchdog = 4;
 
 using Clock = std::chrono::steady_clock;
@@ -31,15 +39,14 @@ struct EquilibriumSolver::Impl {
     g.resize(s.dofCount());
     trial_g.resize(s.dofCount());
     step.resize(s.dofCount());
-    // Edge rotations have no mass; any positive weight serves where a shift needs one.
-    shift_weights = mass.cwiseMax(mass.maxCoeff() * 1e-3);
   }
 
   const ClothSystem& system;
   SparseCholesky cholesky;
-  Eigen::VectorXd mass, shift_weights;
+  Eigen::VectorXd mass;
+  double shift = 0.0;  ///< Of the last indefinite Hessian [N/m].
   Eigen::VectorXd g, trial_g, step;
-  ClothState trial;
+  ClothState trial, escaped;
   /// Last state from which the energy has to fall, and the Newton step there (watchdog).
   struct Reference {
     ClothState state;
@@ -54,38 +61,38 @@ struct EquilibriumSolver::Impl {
   double fullStep(const ClothState& state) const;
   bool lineSearch(ClothState& state, double& energy);
   bool tryFullStep(ClothState& state, double& energy);
+  const Eigen::VectorXd& softestDirection();
   bool leaveSaddle(ClothState& state, double& energy);
   void measureStability(const ClothState& state, EquilibriumSummary& summary);
   Termination iterate(ClothState& state, const EquilibriumOptions& options,
                       EquilibriumSummary& summary, Clock::time_point start);
 };
 
-/// step = -H^-1 g with the exact Hessian if it is positive definite, else with the projected one,
-/// shifted if need be. Returns whether the exact one served.
+/// step = -(H + shift I)^-1 g with the exact Hessian H: no shift if H is positive definite,
+/// otherwise the smallest that makes it so, searched for from where the last one was. All
+/// coordinates are lengths, so one shift [N/m] serves all; being of the size of the softest
+/// negative stiffness, it leaves the stiff directions alone. Returns whether H itself served.
 bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state,
                                               EquilibriumSummary& summary) {
+  const SparseLower& h = system.hessian(state, Projection::kNone);
   ++summary.factorizations;
-  if (cholesky.factorize(system.hessian(state, Projection::kNone))) {
-    cholesky.solve(g, step);
-    step = -step;
-    return true;
-  }
-  const SparseLower& projected = system.hessian(state, Projection::kPositiveSemiDefinite);
-  double scale = 0.0;
-  for (int c = 0; c < projected.size; ++c) {
-    scale = std::max(scale, projected.value[projected.column_begin[c]] / shift_weights[c]);
-  }
-  for (double shift = 1e-10 * scale;; shift *= 100.0) {
-    ++summary.factorizations;
-    if (cholesky.factorize(projected, shift, &shift_weights)) break;
-    if (shift > 1e3 * scale || !std::isfinite(scale)) {
-      step = -g.cwiseQuotient(shift_weights);
-      return false;
+  const bool exact = cholesky.factorize(h);
+  if (!exact) {
+    double stiffest = 0.0;
+    for (int c = 0; c < h.size; ++c) stiffest = std::max(stiffest, h.value[h.column_begin[c]]);
+    const double least = kLeastShift * stiffest;
+    for (shift = std::max(shift, least);; shift *= kStiffen) {
+      ++summary.factorizations;
+      if (cholesky.factorize(h, shift)) break;
+      if (shift > stiffest || !std::isfinite(stiffest)) {
+        step = -g / std::max(stiffest, std::numeric_limits<double>::min());
+        return false;
+      }
     }
   }
   cholesky.solve(g, step);
   step = -step;
-  return false;
+  return exact;
 }
 
 double EquilibriumSolver::Impl::roundingOfForces(const ClothState& state) const {
@@ -150,37 +157,49 @@ bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
     std::swap(state, trial);
     std::swap(g, trial_g);
     energy = e;
+    shift *= k == 0 ? kEase : kStiffen;
     return true;
   }
   return false;
 }
 
-/// Moves along a direction of negative curvature to lower energy.
+/// The softest direction of the last Hessian, by inverse iteration with the factors of H + shift I
+/// at hand.
+const Eigen::VectorXd& EquilibriumSolver::Impl::softestDirection() {
+  for (Eigen::Index i = 0; i < step.size(); ++i)
+    step[i] = std::sin(1.0 + kGoldenAngle * static_cast<double>(i));
+  for (int k = 0; k < kInverseIterations; ++k) {
+    cholesky.solve(step, trial_g);
+    step = trial_g.normalized();
+  }
+  return step;
+}
+
+/// Moves along the softest direction to lower energy. `step` and the factors are those of the
+/// shifted Hessian there.
 bool EquilibriumSolver::Impl::leaveSaddle(ClothState& state, double& energy) {
-  const Eigen::VectorXd v = cholesky.negativeDirection(system.hessian(state, Projection::kNone));
-  if (v.size() == 0) return false;
+  const Eigen::VectorXd& v = softestDirection();
   const double size = std::max(state.q.cwiseAbs().maxCoeff(), 1e-3);
   const double unit = size / v.cwiseAbs().maxCoeff();
   double best = energy;
-  ClothState best_state;
-  for (double length = 1e-5; length < 0.2; length *= 3.0) {
+  for (double length = kFirstEscape; length < kLastEscape; length *= 3.0) {
     bool better = false;
-    for (double sign : {1.0, -1.0}) {
+    for (const double sign : {1.0, -1.0}) {
       trial = state;
       system.advance(trial, v, sign * length * unit);
       const double e = system.energy(trial);
-      if (std::isfinite(e) && e < best) {
-        best = e;
-        best_state = trial;
-        better = true;
-      }
+      if (!std::isfinite(e) || !(e < best)) continue;
+      best = e;
+      std::swap(escaped, trial);
+      better = true;
     }
     if (!better && best < energy) break;
   }
   if (!(best < energy)) return false;
-  state = best_state;
+  std::swap(state, escaped);
   energy = best;
   system.gradient(state, g);
+  reference.steps_since = 0;
   return true;
 }
 
@@ -208,8 +227,7 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
       return Termination::kTimeBudget;
     }
     if (small) {
-      ++summary.factorizations;
-      summary.stable = cholesky.factorize(system.hessian(state, Projection::kNone));
+      summary.stable = newtonDirection(state, summary);
       if (summary.stable || ++saddles > kMaxSaddles || !leaveSaddle(state, energy))
         return Termination::kConverged;
       continue;

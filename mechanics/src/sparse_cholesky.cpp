@@ -2,25 +2,32 @@
 #include "sparse_cholesky.h"
 
 #include <cholmod.h>
+#include <dlfcn.h>
 
-#include <Eigen/Sparse>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <stdexcept>
-
-// Provided by OpenBLAS; absent with another BLAS.
-extern "C" void openblas_set_num_threads(int count) __attribute__((weak));
 
 namespace tenter {
 namespace {
 
-/// Supernodes here are so small that a second BLAS thread costs many times what it saves.
-void useOneBlasThread() {
-  static const bool done = [] {
-    if (openblas_set_num_threads) openblas_set_num_threads(1);
+void callIfLoaded(const char* name, int argument) {
+  if (void* function = dlsym(RTLD_DEFAULT, name))
+    reinterpret_cast<void (*)(int)>(function)(argument);
+}
+
+/// Supernodes here are so small that a second thread inside BLAS (OpenBLAS) or CHOLMOD (OpenMP)
+/// costs many times what it saves. Which BLAS is loaded is known only when the program runs.
+void useOneThreadInside() {
+  static const bool blas = [] {
+    callIfLoaded("openblas_set_num_threads", 1);
     return true;
   }();
-  static_cast<void>(done);
+  static thread_local const bool regions = [] {
+    callIfLoaded("omp_set_max_active_levels", 0);
+    return true;
+  }();
+  static_cast<void>(blas);
+  static_cast<void>(regions);
 }
 
 }  // namespace
@@ -38,7 +45,6 @@ struct SparseCholesky::Impl {
 
   explicit Impl(const SparseLower& pattern)
       : column_begin(pattern.column_begin), row(pattern.row), value(pattern.row.size(), 0.0) {
-    useOneBlasThread();
     cholmod_start(&common);
     common.print = 0;
     common.final_ll = 1;  // L D L' would accept negative pivots
@@ -77,9 +83,11 @@ SparseCholesky::~SparseCholesky() = default;
 
 bool SparseCholesky::factorize(const SparseLower& matrix, double shift,
                                const Eigen::VectorXd* weights) {
+  useOneThreadInside();
   std::copy(matrix.value.begin(), matrix.value.end(), impl_->value.begin());
   if (shift != 0.0) {
-    for (int c = 0; c < matrix.size; ++c) impl_->value[impl_->diagonal[c]] += shift * (*weights)[c];
+    for (int c = 0; c < matrix.size; ++c)
+      impl_->value[impl_->diagonal[c]] += weights ? shift * (*weights)[c] : shift;
   }
   cholmod_factorize(&impl_->matrix, impl_->factor, &impl_->common);
   return impl_->common.status == CHOLMOD_OK && impl_->factor->minor == impl_->factor->n;
@@ -90,6 +98,7 @@ void SparseCholesky::solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x) {
 }
 
 Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& rhs) {
+  useOneThreadInside();
   cholmod_dense b{};
   b.nrow = b.d = rhs.rows();
   b.ncol = rhs.cols();
@@ -102,23 +111,6 @@ Eigen::MatrixXd SparseCholesky::solve(const Eigen::MatrixXd& rhs) {
   if (!ok) throw std::runtime_error("CHOLMOD could not solve: out of memory");
   return Eigen::Map<const Eigen::MatrixXd>(static_cast<const double*>(impl_->solution->x),
                                            rhs.rows(), rhs.cols());
-}
-
-Eigen::VectorXd SparseCholesky::negativeDirection(const SparseLower& m) {
-  using Sparse = Eigen::SparseMatrix<double>;
-  const Eigen::Map<const Sparse> lower(m.size, m.size, static_cast<int>(m.value.size()),
-                                       m.column_begin.data(), m.row.data(), m.value.data());
-  // Without pivoting, L D L' of an indefinite matrix exists but for zero pivots; a negative pivot j
-  // gives v = L^-T e_j with v' H v = d_j < 0.
-  Eigen::SimplicialLDLT<Sparse, Eigen::Lower> ldlt;
-  ldlt.compute(lower);
-  if (ldlt.info() != Eigen::Success) return {};
-  Eigen::Index j = 0;
-  const Eigen::VectorXd d = ldlt.vectorD();
-  if (!(d.minCoeff(&j) < 0.0)) return {};
-  Eigen::VectorXd v = Eigen::VectorXd::Unit(m.size, j);
-  v = ldlt.matrixU().solve(v).eval();
-  return ldlt.permutationPinv() * v;
 }
 
 void multiply(const SparseLower& h, const Eigen::VectorXd& x, Eigen::VectorXd& y) {

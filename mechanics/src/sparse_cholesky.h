@@ -16,16 +16,13 @@ class SparseCholesky {
   SparseCholesky(SparseCholesky&&) noexcept;
   ~SparseCholesky();
 
-  /// Factorises matrix + shift * diag(weights); weights may be null when shift is 0. False when it
-  /// is not positive definite.
+  /// Factorises matrix + shift * diag(weights); null weights are ones. False when it is not
+  /// positive definite.
   bool factorize(const SparseLower& matrix, double shift = 0.0,
                  const Eigen::VectorXd* weights = nullptr);
   /// Solves with the last successful factorisation.
   void solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x);
   Eigen::MatrixXd solve(const Eigen::MatrixXd& rhs);
-
-  /// A direction v with v' H v < 0 for a matrix that factorize() refused; empty when there is none.
-  Eigen::VectorXd negativeDirection(const SparseLower& matrix);
 
  private:
   struct Impl;
