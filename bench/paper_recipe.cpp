@@ -112,7 +112,7 @@ Result<int> runPaper(const std::vector<Measurement>& measurements, const ClothMo
     roles.push_back(testRole(*tests.back(), model));
   }
   PaperFit fit{.state = makeFitState(model, {})};
-  setInitialGuesses(fit.state, pointers, roles, options.nodes);
+  setInitialGuesses(fit.state, pointers, roles);
   std::vector<int> all(tests.size());
   for (std::size_t t = 0; t < all.size(); ++t) all[t] = static_cast<int>(t);
   for (const int g : stageOrder(fit.state, roles)) {

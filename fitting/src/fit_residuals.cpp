@@ -29,13 +29,13 @@ TestResidual summarizeTest(const FitTest& test, const std::vector<FramePredictio
       position_sum += frame.position_rms_m * frame.position_rms_m;
       ++position_count;
     }
-    const Eigen::Index size = frame.measured_force_N.size(), per_clip = size % 3 == 0 ? 3 : 1;
-    for (Eigen::Index i = 0; i + per_clip <= size; i += per_clip) {
-      const auto measured = frame.measured_force_N.segment(i, per_clip);
-      force_sum += (frame.predicted_force_N.segment(i, per_clip) - measured).squaredNorm();
-      force_max = std::max(force_max, measured.norm());
-      ++force_count;
-    }
+    const Eigen::VectorXd& measured = frame.measured_force_N;
+    if (measured.size() == 0) continue;
+    force_sum += (frame.predicted_force_N - measured).squaredNorm();
+    ++force_count;
+    const Eigen::Index per_clip = measured.size() % 3 == 0 ? 3 : 1;
+    for (Eigen::Index i = 0; i + per_clip <= measured.size(); i += per_clip)
+      force_max = std::max(force_max, measured.segment(i, per_clip).norm());
   }
   const double none = std::numeric_limits<double>::quiet_NaN();
   residual.force_rms_N = force_count > 0 ? std::sqrt(force_sum / force_count) : none;

@@ -109,11 +109,22 @@ std::vector<int> testsOfGroup(const FitState& state, int group,
         roles[t].primary >= 0 && state.groups[state.groupOf(roles[t].primary)].bending == g.bending;
     if (same_family && sees(roles[t], g)) family.push_back(t);
   }
-  if (!own.empty()) return own;
-  if (!family.empty()) return family;
+  // Springs that bend are pulled in other tests as well: a stiffness that only bend tests chose
+  // would spoil those.
+  const bool alone = !(g.bending && state.model->bending == BendingElement::kSprings);
+  if (alone && !own.empty()) return own;
+  if (alone && !family.empty()) return family;
   for (int t = 0; t < static_cast<int>(roles.size()); ++t)
     if (sees(roles[t], g)) family.push_back(t);
   return family;
+}
+
+std::vector<int> isolatingTests(const FitState& state, int group,
+                                const std::vector<TestRole>& roles) {
+  std::vector<int> tests;
+  for (int t = 0; t < static_cast<int>(roles.size()); ++t)
+    if (isolates(roles[t], state.groups[group])) tests.push_back(t);
+  return tests.empty() ? testsOfGroup(state, group, roles) : tests;
 }
 
 void tieUnseenDirections(FitState& state, const std::vector<TestRole>& roles) {

@@ -18,6 +18,10 @@ TestRole testRole(const FitTest& test, const ClothModel& model);
 /// bending) that see one.
 std::vector<int> testsOfGroup(const FitState& state, int group, const std::vector<TestRole>& roles);
 
+/// Tests whose strains say where the group's knots belong: those that isolate it, if there are any.
+std::vector<int> isolatingTests(const FitState& state, int group,
+                                const std::vector<TestRole>& roles);
+
 /// Ties a direction that no test sees to its partner (weft to warp, bending of the diagonal to the
 /// others), as an assumption.
 void tieUnseenDirections(FitState& state, const std::vector<TestRole>& roles);

@@ -205,7 +205,8 @@ void FitRun::addKnots(int group, const std::vector<int>& tests, const OuterOptio
   StrainRange range{std::numeric_limits<double>::infinity(),
                     -std::numeric_limits<double>::infinity()};
   for (int i = 0; i < state_.groups[group].assumed_from; ++i) {
-    const StrainRange r = rangeOf(state_.groups[group].members[i], tests);
+    const StrainRange r =
+        rangeOf(state_.groups[group].members[i], isolatingTests(state_, group, roles_));
     range = {std::min(range.begin, r.begin), std::max(range.end, r.end)};
   }
   const double width = range.end - range.begin;
@@ -289,7 +290,7 @@ bool FitRun::refine() {
 bool FitRun::run() {
   std::vector<const Measurement*> measurements;
   for (const FitTest* test : tests_) measurements.push_back(&test->measurement());
-  setInitialGuesses(state_, measurements, roles_, options_.test.nodes);
+  setInitialGuesses(state_, measurements, roles_);
   for (const int group : stageOrder(state_, roles_)) {
     if (evaluator_.cancelled()) break;
     if (!state_.groups[group].may_be_negative) fitGroup(group);

@@ -17,6 +17,7 @@ constexpr double kShearOverStretch = 0.1;
 constexpr double kVisibleGamma = 10.0;
 /// Bending length of ordinary clothing fabric [m], where no test bends the cloth: B = w c^3.
 constexpr double kOrdinaryBendingLength_m = 0.025;
+constexpr double kSpringBendOverStretch = 0.01;
 constexpr double kPoissonOverStretch = 0.3;
 /// Strain at which shear stiffening would double the shear stiffness: only the scale of that
 /// coefficient.
@@ -61,38 +62,29 @@ double bendLength_m(const Measurement& m) {
   return 0.5 * m.sample_size_m.maxCoeff();
 }
 
-/// Ring-2 springs resist bending by shortening, l/l0 - 1 = -(kappa h)^2 / 8: the stiffness that
-/// stores what B would at the curvature 1 / bend length, h their half length.
-double springForRigidity(double rigidity_N_m, double length_m, double spacing_m) {
-  const double bend = spacing_m / length_m;
-  return 64.0 * rigidity_N_m / (bend * bend * spacing_m * spacing_m);
-}
-
 /// Guesses of the groups that tests isolate; zero for the others.
 std::vector<double> guessesFromData(const FitState& state,
                                     const std::vector<const Measurement*>& measurements,
-                                    const std::vector<TestRole>& roles, int nodes) {
+                                    const std::vector<TestRole>& roles) {
   std::vector<double> guess(state.groups.size(), 0.0);
   for (std::size_t t = 0; t < roles.size(); ++t) {
     if (roles[t].primary < 0) continue;
     const int g = state.groupOf(roles[t].primary);
     const Measurement& m = *measurements[t];
-    double value = secantStiffness_N_per_m(m);
-    if (state.groups[g].bending) {
-      value = visibleRigidity_N_m(m);
-      if (state.model->bending == BendingElement::kSprings)
-        value = springForRigidity(value, bendLength_m(m), bendLength_m(m) / (nodes - 1));
-    }
-    guess[g] = std::max(guess[g], value);
+    if (state.groups[g].bending && state.model->bending == BendingElement::kSprings) continue;
+    guess[g] = std::max(
+        guess[g], state.groups[g].bending ? visibleRigidity_N_m(m) : secantStiffness_N_per_m(m));
   }
   return guess;
 }
 
-double assumedRigidity(const FitState& state, const Measurement& m, int nodes) {
-  const double rigidity = weight_N_per_m2(m) * std::pow(kOrdinaryBendingLength_m, 3);
-  if (state.model->bending != BendingElement::kSprings) return rigidity;
-  const double length = m.tensile ? m.tensile->length_m : bendLength_m(m);
-  return springForRigidity(rigidity, kOrdinaryBendingLength_m, length / (nodes - 1));
+/// Where no test says: hinges have an ordinary bending length. Ring-2 springs stand beside the
+/// stretch springs, so a stiff one would take their test away from them; what bends does so later
+/// ([Est12] sec. 5.2 leaves bending out of stretch fits).
+double assumedBending(const FitState& state, const Measurement& m, double stretch_N_per_m) {
+  if (state.model->bending == BendingElement::kSprings)
+    return kSpringBendOverStretch * stretch_N_per_m;
+  return weight_N_per_m2(m) * std::pow(kOrdinaryBendingLength_m, 3);
 }
 
 }  // namespace
@@ -123,14 +115,14 @@ double visibleRigidity_N_m(const Measurement& m) {
 }
 
 void setInitialGuesses(FitState& state, const std::vector<const Measurement*>& measurements,
-                       const std::vector<TestRole>& roles, int nodes) {
-  const std::vector<double> guess = guessesFromData(state, measurements, roles, nodes);
+                       const std::vector<TestRole>& roles) {
+  const std::vector<double> guess = guessesFromData(state, measurements, roles);
   double stretch = 0.0, bend = 0.0;
   for (std::size_t g = 0; g < guess.size(); ++g)
     (state.groups[g].bending ? bend : stretch) =
         std::max(state.groups[g].bending ? bend : stretch, guess[g]);
   if (stretch <= 0.0) stretch = kFallbackStretch_N_per_m;
-  if (bend <= 0.0) bend = assumedRigidity(state, *measurements.front(), nodes);
+  if (bend <= 0.0) bend = assumedBending(state, *measurements.front(), stretch);
 
   const int shear = state.groupOf(std::max(0, state.model->componentIndex("shear")));
   for (int g = 0; g < static_cast<int>(guess.size()); ++g) {

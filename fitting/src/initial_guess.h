@@ -16,9 +16,8 @@ double secantStiffness_N_per_m(const Measurement& measurement);
 /// length^3 / Gamma, Gamma = 10 [N m].
 double visibleRigidity_N_m(const Measurement& measurement);
 
-/// Sets every group to one constant from the data alone, good to a decade or two; `nodes` a side of
-/// the replica (ring-2 springs depend on it).
+/// Sets every group to one constant from the data alone, good to a decade or two.
 void setInitialGuesses(FitState& state, const std::vector<const Measurement*>& measurements,
-                       const std::vector<TestRole>& roles, int nodes);
+                       const std::vector<TestRole>& roles);
 
 }  // namespace tenter

@@ -15,9 +15,12 @@ namespace {
 constexpr double kRoundingCost = 1e-18;
 /// Smallest relative change of z that is worth another set of equilibria.
 constexpr double kParameterTolerance = 1e-9;
-/// Each rejection shortens the step by twice as much as the last: after four there is nothing to
+/// Damping of the first step is 1 / radius of the diagonal: Ceres' own 1e4 leaves so little of it
+/// that several rejections in a row would change nothing, and each costs a set of equilibria.
+constexpr double kFirstRadius = 100.0;
+/// Each rejection shortens the step by twice as much as the last: after five there is nothing to
 /// gain.
-constexpr int kMaxRejectedSteps = 4;
+constexpr int kMaxRejectedSteps = 5;
 /// Two steps in a row that gain less than this share of the cost, or one and then a rejection, mean
 /// that what is left are jumps between shapes: a smooth sum of squares converges quadratically.
 constexpr double kStalledGain = 1e-3;
@@ -130,6 +133,7 @@ ceres::Solver::Options solverOptions(const OuterOptions& options, int threads, D
   ceres_options.max_num_iterations = options.max_iterations;
   ceres_options.function_tolerance = options.relative_tolerance;
   ceres_options.gradient_tolerance = 0.0;
+  ceres_options.initial_trust_region_radius = kFirstRadius;
   ceres_options.parameter_tolerance = kParameterTolerance;
   ceres_options.line_search_interpolation_type = ceres::QUADRATIC;
   ceres_options.max_num_line_search_step_size_iterations = 5;

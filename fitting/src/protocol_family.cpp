@@ -57,9 +57,13 @@ std::vector<int> componentsSeen(const ProtocolFamily& family, const ClothModel& 
       seen.push_back(index);
   };
   for (const std::string_view name : family.components) see(name);
-  // Diagonal springs lengthen when the cloth is stretched along a yarn.
-  if (family.summary == Summary::kAxialForce && model.membrane == MembraneElement::kSprings)
-    see("shear");
+  if (model.bending == BendingElement::kSprings && family.forces != ForceRows::kNone) {
+    // Diagonal springs lengthen when the cloth is stretched along a yarn, and springs to the second
+    // neighbour stand beside all others.
+    for (const std::string_view name : {"shear", "bend_diagonal"}) see(name);
+    if (family.prefix == "stretch-weft") see("bend_weft");
+    if (family.prefix == "stretch-warp") see("bend_warp");
+  }
   if (family.components.empty())
     for (int i = 0; i < model.componentCount(); ++i) seen.push_back(i);
   return seen;

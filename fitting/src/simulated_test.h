@@ -105,6 +105,7 @@ class SimulatedTest : public FitTest {
   /// if none converges.
   FrameOutcome solveFrom(Simulation& simulation, std::vector<ClothState> starts, int max_iterations,
                          ClothState& state) const;
+  static void polish(Simulation& simulation, ClothState& state);
   /// Brings the frame's current solution up to date, factorised if derivatives are wanted. dofs x
   /// parameters, or empty.
   Eigen::MatrixXd solve(Simulation& simulation, int frame, bool with_derivatives,

@@ -49,7 +49,7 @@ struct TestResidual {
   int frames = 0;
   double force_rms_N = 0.0;  ///< NaN without forces.
   double force_nrmse =
-      0.0;  ///< rms of the vector clip-force error / largest measured force; axial for a strip.
+      0.0;  ///< rms of the stacked clip-force errors / largest clip force; axial for a strip.
   double position_rms_m = 0.0;  ///< NaN without positions.
   double chi2_per_dof = 0.0;
   int unconverged_frames = 0, unstable_frames = 0, multistable_frames = 0;
