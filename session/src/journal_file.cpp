@@ -134,7 +134,9 @@ Result<void> JournalFile::close() {
     closed_ = true;
     if (!broken_ && reserved_end_ > size_bytes_) ::ftruncate(fd_.get(), size_bytes_);
   }
-  return sync();
+  auto done = sync();
+  ::flock(fd_.get(), LOCK_UN);  // The next writer need not wait for this object's end.
+  return done;
 }
 
 void JournalFile::commitPeriodically(const std::stop_token& stop) {

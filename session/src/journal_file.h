@@ -37,7 +37,7 @@ class JournalFile {
   Result<std::uint64_t> append(std::string_view encoded, bool may_use_reserve);
   /// Returns once all that was appended before is on the disk.
   Result<void> sync();
-  /// Syncs and gives the reserve back. No append after it.
+  /// Syncs, gives the reserve back and unlocks. No append after it.
   Result<void> close();
 
   std::uint64_t records() const;
