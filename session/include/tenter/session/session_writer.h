@@ -78,7 +78,8 @@ class SessionWriter {
 
   /// Puts everything so far on the disk.
   Result<void> sync();
-  /// Adds the "closed" record and ends; another writer may then open the session. No append after it.
+  /// Adds the "closed" record and ends; another writer may then open the session. No append after
+  /// it.
   Result<void> close(std::int64_t time_ns);
 
   /// Records that are on the disk for certain: those with smaller sequence numbers.
