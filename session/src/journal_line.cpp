@@ -26,9 +26,9 @@ std::optional<std::uint32_t> parseCrc(std::string_view digits) {
 
 }  // namespace
 
-std::uint32_t crc32Of(std::string_view bytes) {
+std::uint32_t crc32Of(std::string_view bytes, std::uint32_t before) {
   return static_cast<std::uint32_t>(
-      crc32_z(0, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+      crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 std::string hexadecimal(std::uint32_t value) {

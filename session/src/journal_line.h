@@ -17,8 +17,8 @@ void appendSealed(std::string& out, std::string_view json);
 /// The JSON of a line without its line end, or nothing if the CRC does not fit.
 std::optional<std::string_view> unsealed(std::string_view line);
 
-/// CRC-32 as zlib computes it.
-std::uint32_t crc32Of(std::string_view bytes);
+/// CRC-32 as zlib computes it, of what `before` is the CRC of and then these bytes.
+std::uint32_t crc32Of(std::string_view bytes, std::uint32_t before = 0);
 std::string hexadecimal(std::uint32_t value);
 
 /// One line as it lies in the file, good or not.

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <functional>
 #include <system_error>
 
 #include "posix_file.h"
@@ -22,18 +23,55 @@ namespace {
 
 constexpr const char* kReportFormat = "tenter-session-repair";
 
-Result<std::string> readTail(const fs::path& journal, int fd, const TornTail& tail) {
-  std::string bytes(tail.cut_bytes, '\0');
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count = ::pread(fd, bytes.data() + done, bytes.size() - done,
-                                  static_cast<off_t>(tail.offset_bytes + done));
+/// Hands the torn tail to `take` in blocks: it may be larger than memory. Its first error ends it.
+Result<void> readTail(const fs::path& journal, int fd, const TornTail& tail,
+                      const std::function<Result<void>(std::string_view)>& take) {
+  std::string block(std::size_t{1} << 16, '\0');
+  std::uint64_t done = 0;
+  while (done < tail.cut_bytes) {
+    const auto wanted = std::min<std::uint64_t>(block.size(), tail.cut_bytes - done);
+    const ssize_t count =
+        ::pread(fd, block.data(), wanted, static_cast<off_t>(tail.offset_bytes + done));
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return fileError(journal, "cannot be read", errno);
     if (count == 0) return badInput(journal.string(), "", "became shorter while it was repaired");
-    done += static_cast<std::size_t>(count);
+    const auto taken = take(std::string_view(block).substr(0, static_cast<std::size_t>(count)));
+    if (!taken) return taken;
+    done += static_cast<std::uint64_t>(count);
   }
-  return bytes;
+  return {};
+}
+
+Result<std::uint32_t> crcOfTail(const fs::path& journal, int fd, const TornTail& tail) {
+  std::uint32_t crc = 0;
+  const auto done = readTail(journal, fd, tail, [&](std::string_view block) -> Result<void> {
+    crc = crc32Of(block, crc);
+    return {};
+  });
+  if (!done) return done.error();
+  return crc;
+}
+
+/// Complete or absent, like all that a report speaks of.
+Result<void> saveTail(const fs::path& journal, int fd, const TornTail& tail, const fs::path& file) {
+  const fs::path part = file.string() + format::kPartSuffix;
+  std::error_code error;
+  fs::remove(part, error);
+  const Descriptor out(::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+  if (!out.valid()) return fileError(part, "cannot be written", errno);
+  auto done = readTail(journal, fd, tail, [&](std::string_view block) -> Result<void> {
+    const int code = writeAll(out.get(), block);
+    if (code == 0) return {};
+    return fileError(part, "cannot be written", code);
+  });
+  if (done && ::fdatasync(out.get()) != 0) done = fileError(part, "cannot be synced", errno);
+  if (done) {
+    fs::rename(part, file, error);
+    if (!error) return {};
+    done = badInput(file.string(), "", "cannot be put in place: " + error.message());
+  }
+  fs::remove(part, error);
+  return done;
 }
 
 std::string reportText(const RepairReport& report, std::chrono::system_clock::time_point now) {
@@ -70,19 +108,19 @@ Result<void> moveStrays(const fs::path& session, const fs::path& place,
 }
 
 /// The report and all it speaks of are on the disk before anything is cut.
-Result<void> save(const fs::path& session, const RepairReport& report, const std::string& tail,
+Result<void> save(const fs::path& session, int fd, const TornTail& tail, const RepairReport& report,
                   std::chrono::system_clock::time_point now) {
   const fs::path place = session / report.report;
   std::error_code error;
+  fs::create_directories(place, error);
+  if (error) return badInput(place.string(), "", "cannot be made: " + error.message());
   if (!fs::exists(place / format::kReportFile, error)) {
-    if (auto done = writeFileAtomically(place / format::kTailFile, tail); !done) return done;
-    if (auto done = writeFileAtomically(place / format::kReportFile, reportText(report, now));
-        !done) {
-      return done;
-    }
+    auto done = saveTail(session / format::kJournalFile, fd, tail, place / format::kTailFile);
+    if (done) done = writeFileAtomically(place / format::kReportFile, reportText(report, now));
     for (const fs::path& folder : {place, place.parent_path(), session}) {
-      if (auto done = syncFolder(folder); !done) return done;
+      if (done) done = syncFolder(folder);
     }
+    if (!done) return done;
   }
   return moveStrays(session, place, report.stray_files);
 }
@@ -135,11 +173,11 @@ Result<RepairReport> repairTornSession(const fs::path& folder, int fd, const Jou
   if (!strays) return strays.error();
   report.stray_files = std::move(*strays);
   if (report.cut_bytes > 0 || !report.stray_files.empty()) {
-    const auto tail = readTail(journal, fd, survey.tail);
-    if (!tail) return tail.error();
+    const auto crc = crcOfTail(journal, fd, survey.tail);
+    if (!crc) return crc.error();
     report.report = std::string(format::kRepairsFolder) + "/" +
-                    format::padded(report.offset_bytes, 12) + "-" + hexadecimal(crc32Of(*tail));
-    if (auto done = save(folder, report, *tail, now); !done) return done.error();
+                    format::padded(report.offset_bytes, 12) + "-" + hexadecimal(*crc);
+    if (auto done = save(folder, fd, survey.tail, report, now); !done) return done.error();
   }
   if (report.cut_bytes > 0 || report.newline_added) {
     if (auto done = cut(journal, fd, survey); !done) return done.error();

@@ -68,6 +68,16 @@ TEST_F(SessionRepairTest, TheTornTailGoesIntoTheReportAndTheSessionGoesOn) {
   EXPECT_THAT(std::get<SessionEvent>(records[33].body).data, HasSubstr(report.report));
 }
 
+TEST_F(SessionRepairTest, ALongTailGoesOverInBlocks) {
+  std::string torn;
+  for (int i = 0; torn.size() < 200'000; ++i) torn += "rubbish " + std::to_string(i) + "\n";
+  folder_.write("s/journal.jsonl", whole_ + torn);
+  const RepairReport report = repaired();
+  EXPECT_EQ(report.cut_bytes, torn.size());
+  EXPECT_EQ(slurp(session_ / report.report / "tail.bin"), torn);
+  EXPECT_TRUE(verifySession(session_)->ok());
+}
+
 TEST_F(SessionRepairTest, ARecordThatLacksOnlyItsLineEndIsKept) {
   folder_.write("s/journal.jsonl", whole_.substr(0, whole_.size() - 1));
   const RepairReport report = repaired();
