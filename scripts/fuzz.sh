@@ -24,6 +24,7 @@ if [[ -z "$version" ]]; then
   exit 77
 fi
 
+mkdir -p build
 # libFuzzer's own instrumentation goes into everything, its main only into the fuzzers.
 cmake -S . -B build/fuzz -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo -DTENTER_FUZZ=ON -DTENTER_BENCHMARKS=OFF \
   -DTENTER_SANITIZE=address,undefined,fuzzer-no-link \
