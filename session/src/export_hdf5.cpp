@@ -94,7 +94,7 @@ class Channels {
 /// The table of samples. A rig without cells, or without actuators, has no such group.
 class Samples {
  public:
-  Samples(Hdf5File& out, const SessionHeader& h) : out_(out), time_(out, "/entry/time", 0, "ns") {
+  Samples(Hdf5File& out, const SessionHeader& h) : time_(out, "/entry/time", 0, "ns") {
     out.attribute("/entry/time", "start", h.start_utc);
     if (!h.actuators.empty()) {
       out.attribute("/entry", "default", h.cells.empty() ? "positions" : "tensions");
@@ -131,7 +131,6 @@ class Samples {
   }
 
  private:
-  Hdf5File& out_;
   Hdf5Column<std::int64_t> time_;
   std::optional<Channels> positions_, tensions_;
   std::optional<Hdf5Column<std::uint8_t>> status_;
@@ -253,7 +252,7 @@ Result<void> exportSessionToHdf5(const fs::path& session, const fs::path& file) 
   fs::path part = target;
   part.replace_filename("." + target.filename().string() + ".part-" + std::to_string(::getpid()));
   fs::remove(part, error);
-  const auto written = writeHdf5(**reader, *session_json, part, file.string());
+  auto written = writeHdf5(**reader, *session_json, part, file.string());
   std::error_code rename_error;
   if (written) fs::rename(part, target, rename_error);
   if (written && !rename_error) return syncFolder(target.parent_path());

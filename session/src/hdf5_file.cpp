@@ -142,7 +142,7 @@ void Hdf5File::link(const std::string& existing, const std::string& path) {
 }
 
 template <class Item>
-Hdf5Column<Item>::Hdf5Column(Hdf5File& file, std::string path, std::size_t width,
+Hdf5Column<Item>::Hdf5Column(Hdf5File& file, const std::string& path, std::size_t width,
                              const std::string& units)
     : file_(file), width_(width) {
   if (!file_.ok()) return;

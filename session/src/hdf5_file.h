@@ -83,7 +83,7 @@ template <class Item>
 class Hdf5Column {
  public:
   /// `units` may be empty.
-  Hdf5Column(Hdf5File& file, std::string path, std::size_t width, const std::string& units);
+  Hdf5Column(Hdf5File& file, const std::string& path, std::size_t width, const std::string& units);
   void add(Item item);
   void flush();
 

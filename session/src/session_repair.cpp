@@ -35,7 +35,7 @@ Result<void> readTail(const fs::path& journal, int fd, const TornTail& tail,
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return fileError(journal, "cannot be read", errno);
     if (count == 0) return badInput(journal.string(), "", "became shorter while it was repaired");
-    const auto taken = take(std::string_view(block).substr(0, static_cast<std::size_t>(count)));
+    auto taken = take(std::string_view(block).substr(0, static_cast<std::size_t>(count)));
     if (!taken) return taken;
     done += static_cast<std::uint64_t>(count);
   }

@@ -224,7 +224,7 @@ Result<void> SessionWriter::sync() { return state_->journal->sync(); }
 
 Result<void> SessionWriter::close(std::int64_t time_ns) {
   const auto added = append(time_ns, SessionEvent{format::kClosed, "{}"});
-  const auto closed = state_->journal->close();
+  auto closed = state_->journal->close();
   if (!added) return added.error();
   return closed;
 }
