@@ -12,6 +12,7 @@ find_package(CLI11 2.1 REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(TBB REQUIRED)
 find_package(Ceres 2.1 REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOPLY IOXML)
 
 # tenter_cholmod: SuiteSparse 5.12 of Debian comes without a CMake package.
@@ -21,6 +22,10 @@ add_library(tenter_cholmod INTERFACE)
 add_library(tenter::cholmod ALIAS tenter_cholmod)
 target_include_directories(tenter_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
 target_link_libraries(tenter_cholmod INTERFACE ${CHOLMOD_LIBRARY})
+
+# HDF5 without MPI, even where its parallel build is installed too.
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET GLOBAL hdf5-serial)
 
 # tests only
 find_package(GTest 1.12 REQUIRED)

@@ -9,7 +9,7 @@ packages=(
   build-essential cmake ninja-build pkg-config git clang-format-16 clang-tidy-16
   # libraries
   libeigen3-dev libceres-dev libsuitesparse-dev libopenblas-pthread-dev libopenblas0-pthread libtbb-dev
-  nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev libssl-dev libvtk9-dev
+  nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev libssl-dev libvtk9-dev zlib1g-dev libhdf5-dev
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-numpy python3-jsonschema
 )

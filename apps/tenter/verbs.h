@@ -14,6 +14,7 @@ Verb exportVerb();
 Verb drapeVerb();
 Verb twinVerb();
 Verb protocolVerb();
+Verb sessionVerb();
 Verb demoVerb();
 Verb versionVerb();
 
