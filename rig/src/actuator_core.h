@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <mutex>
 
 #include "tenter/rig/actuator.h"
@@ -14,6 +15,19 @@ enum class OperationKind {
   kPlain,   ///< A halt cuts it short.
   kMotion,  ///< So too, and it is refused after a halt.
   kHalt,    ///< Cuts short what is under way and refuses motion from then on.
+};
+
+/// A mutex that can be waited for until a moment; taken with std::unique_lock. (The thread
+/// sanitizer of GCC 12 does not know std::timed_mutex.)
+class AxisMutex {
+ public:
+  bool try_lock_until(std::chrono::steady_clock::time_point deadline);  // NOLINT: std's name
+  void unlock();
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable freed_;
+  bool held_ = false;
 };
 
 /// What is behind an Actuator.
@@ -29,7 +43,7 @@ class ActuatorCore {
   const AxisConfig config;
   const ActuatorDriverRow& row;
   const std::shared_ptr<UsbTransport> transport;
-  std::timed_mutex operation;  ///< Held by the operation under way; guards `driver`.
+  AxisMutex operation;  ///< Held by the operation under way; guards `driver`.
   std::unique_ptr<ActuatorDriver> driver;
   std::atomic<bool> motion_forbidden{false};
   std::atomic<unsigned> halts{0};

@@ -87,7 +87,7 @@ class RunningTask {
   const AxisTask& task_;
   Clock::time_point deadline_;
   std::shared_ptr<UsbBell> bell_;
-  std::unique_lock<std::timed_mutex> held_;
+  std::unique_lock<AxisMutex> held_;
   unsigned halts_ = 0;
   std::shared_ptr<UsbLink> link_;
   UsbScript script_;
@@ -110,6 +110,20 @@ void pump(std::vector<RunningTask>& running, UsbBell& bell, unsigned& rings,
 }
 
 }  // namespace
+
+bool AxisMutex::try_lock_until(Clock::time_point deadline) {
+  std::unique_lock lock(mutex_);
+  if (!freed_.wait_until(lock, deadline, [this] { return !held_; })) return false;
+  held_ = true;
+  return true;
+}
+
+void AxisMutex::unlock() {
+  // Under the lock: the next holder may end the life of this mutex.
+  const std::lock_guard lock(mutex_);
+  held_ = false;
+  freed_.notify_one();
+}
 
 std::vector<AxisOutcome> runTogether(const std::vector<AxisTask>& tasks,
                                      std::chrono::milliseconds timeout) {

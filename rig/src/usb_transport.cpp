@@ -53,18 +53,23 @@ void UsbTransport::handleEvents() {
     timeval wait{0, waiting ? std::chrono::microseconds(kEventWait).count() : 0};
     libusb_handle_events_timeout_completed(context_, &wait, nullptr);
     lock.lock();
-    closeRetired();
+    const std::vector<libusb_device_handle*> closable = takeClosable();
+    lock.unlock();
+    // Only on this thread, for libusb looks at a handle once more after it called back.
+    for (libusb_device_handle* handle : closable) libusb_close(handle);
+    lock.lock();
   }
 }
 
-// Only on the thread of events, for libusb looks at a handle once more after it called back.
-void UsbTransport::closeRetired() {
+std::vector<libusb_device_handle*> UsbTransport::takeClosable() {
+  std::vector<libusb_device_handle*> closable;
   std::erase_if(retired_, [&](libusb_device_handle* handle) {
     if (in_flight_[handle] > 0) return false;
     in_flight_.erase(handle);
-    libusb_close(handle);
+    closable.push_back(handle);
     return true;
   });
+  return closable;
 }
 
 void UsbTransport::retire(libusb_device_handle* handle) {

@@ -123,7 +123,7 @@ class UsbTransport : public std::enable_shared_from_this<UsbTransport> {
   friend class UsbTransfer;
   UsbTransport() = default;
   void handleEvents();
-  void closeRetired();
+  std::vector<libusb_device_handle*> takeClosable();
   void retire(libusb_device_handle* handle);
   void countIn(libusb_device_handle* handle);
   void countOut(libusb_device_handle* handle);

@@ -111,9 +111,9 @@ TEST(LacActuator, AfterAnUnfinishedOperationThePipeIsEmptiedFirst) {
 
 TEST(LacActuator, WhatItCannotDoIsRefused) {
   LacActuator driver(axisConfig());
-  for (const UsbScript& script : {driver.setTarget(0.2), driver.setTarget(-0.01),
-                                  driver.setVelocity(0.006), driver.setSpeedLimit(0.0004),
-                                  driver.setPosition(0.01)}) {
+  for (const UsbScript& script :
+       {driver.setTarget(0.2), driver.setTarget(-0.01), driver.setVelocity(0.006),
+        driver.setSpeedLimit(0.0004), driver.setPosition(0.01)}) {
     const ScriptRun run = play(script, FakeLac());
     EXPECT_TRUE(run.sent.empty());
     EXPECT_EQ(run.end.fault, ActuatorFault::kOutOfRange);

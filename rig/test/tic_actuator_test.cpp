@@ -29,13 +29,13 @@ AxisConfig axisConfig() {
 /// Bytes as the maker's guide lays them out, written by hand.
 std::vector<std::uint8_t> variableBytes() {
   std::vector<std::uint8_t> bytes(0x39, 0);
-  bytes[0x00] = 10;                                                     // normal
-  bytes[0x01] = 0x05;                                                   // energised, forward limit
-  bytes[0x02] = 0x40;                                                   // command time-out
-  bytes[0x04] = 0xC0;                                                   // and safe start, once
+  bytes[0x00] = 10;                                                    // normal
+  bytes[0x01] = 0x05;                                                  // energised, forward limit
+  bytes[0x02] = 0x40;                                                  // command time-out
+  bytes[0x04] = 0xC0;                                                  // and safe start, once
   bytes[0x22] = 0x18, bytes[0x23] = bytes[0x24] = bytes[0x25] = 0xFC;  // -50529256
-  bytes[0x26] = 0x10, bytes[0x27] = 0x27;                               // 10000: one microstep/s
-  bytes[0x33] = 0xE0, bytes[0x34] = 0x2E;                               // 12000 mV
+  bytes[0x26] = 0x10, bytes[0x27] = 0x27;                              // 10000: one microstep/s
+  bytes[0x33] = 0xE0, bytes[0x34] = 0x2E;                              // 12000 mV
   return bytes;
 }
 
@@ -102,7 +102,8 @@ TEST(TicActuator, StartWritesOnlyWhatDiffersAndReadsItBack) {
   FakeTic device;
   ScriptRun run = play(driver.start(), std::ref(device));
   EXPECT_EQ(run.end.fault, ActuatorFault::kNone) << run.end.detail;
-  EXPECT_THAT(codesOf(run), ElementsAre(0xA8, 0x13, 0x13, 0x13, 0x10, 0xE6, 0xEA, 0xE9, 0xA8, 0xA1));
+  EXPECT_THAT(codesOf(run),
+              ElementsAre(0xA8, 0x13, 0x13, 0x13, 0x10, 0xE6, 0xEA, 0xE9, 0xA8, 0xA1));
   EXPECT_EQ(device.settings[0x09], 200);
   EXPECT_EQ(device.settings[0x0A], 0);
   EXPECT_EQ(device.settings[0x53], 1) << "halt and hold";
@@ -185,12 +186,17 @@ TEST(ActuatorConfig, WhatCannotBeIsRefusedWithItsField) {
   refused("metres_per_unit", [](AxisConfig& a) { a.metres_per_unit = NAN; });
   refused("travel", [](AxisConfig& a) { a.travel_max_m = a.travel_min_m; });
   refused("travel", [](AxisConfig& a) { a.travel_max_m = 50.0; });
-  refused("travel", [](AxisConfig& a) { a.metres_per_unit = 1e-12; a.max_speed_m_per_s = 1e-9; a.max_acceleration_m_per_s2 = 1e-6; });
+  refused("travel", [](AxisConfig& a) {
+    a.metres_per_unit = 1e-12;
+    a.max_speed_m_per_s = 1e-9;
+    a.max_acceleration_m_per_s2 = 1e-6;
+  });
   refused("max_speed_m_per_s", [](AxisConfig& a) { a.max_speed_m_per_s = 4.0; });
   refused("max_speed_m_per_s", [](AxisConfig& a) { a.max_speed_m_per_s = NAN; });
   refused("max_speed_m_per_s", [](AxisConfig& a) { a.metres_per_unit = 1e-8; });
   refused("max_acceleration", [](AxisConfig& a) { a.max_acceleration_m_per_s2 = 0.0; });
-  refused("command_timeout", [](AxisConfig& a) { a.command_timeout = std::chrono::milliseconds(0); });
+  refused("command_timeout",
+          [](AxisConfig& a) { a.command_timeout = std::chrono::milliseconds(0); });
   refused("origin_m", [](AxisConfig& a) { a.origin_m = INFINITY; });
 }
 

@@ -121,6 +121,16 @@ TEST(ActuatorFaults, AMissingDeviceIsNamedBySerialNumber) {
   EXPECT_NE(outcomes[1].error().message().find("00000002"), std::string::npos);
 }
 
+TEST(ActuatorFaults, ADeviceIsAlsoFoundByItsPort) {
+  std::vector<AxisConfig> axes = ticAxes(3);
+  axes[1].serial.clear();
+  axes[1].port = "1-2";
+  VirtualRig rig(ticSpecs(3), axes);
+  EXPECT_EQ(rig.bank.axis(1).identity()->serial, "00000002");
+  axes[1].serial = axes[0].serial;
+  EXPECT_FALSE(ActuatorBank::create(axes).ok()) << "one device for two axes";
+}
+
 TEST(ActuatorFaults, SlowAnswersAreWaitedForUpToTheTimeout) {
   VirtualRig rig(1);
   rig.usb->setLatency(0, std::chrono::milliseconds(20));

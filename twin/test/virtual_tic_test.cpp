@@ -28,9 +28,9 @@ class TicBench {
   }
   void set(int offset, int value) {
     int actual = 0;
-    tic->control({0x40, 0x13, static_cast<std::uint16_t>(value),
-                  static_cast<std::uint16_t>(offset), 0},
-                 {}, actual);
+    tic->control(
+        {0x40, 0x13, static_cast<std::uint16_t>(value), static_cast<std::uint16_t>(offset), 0}, {},
+        actual);
   }
   std::uint32_t variable(int offset, int bytes) {
     std::vector<std::uint8_t> data(static_cast<std::size_t>(bytes));
