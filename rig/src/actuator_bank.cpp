@@ -40,6 +40,7 @@ Result<ActuatorBank> ActuatorBank::create(std::vector<AxisConfig> axes) {
   Result<std::shared_ptr<UsbTransport>> transport = UsbTransport::open();
   if (!transport) return transport.error();
   std::vector<Actuator> actuators;
+  actuators.reserve(axes.size());
   for (AxisConfig& axis : axes) actuators.emplace_back(std::move(axis), *transport);
   return ActuatorBank(*transport, std::move(actuators));
 }
@@ -58,6 +59,7 @@ Cores ActuatorBank::cores() const {
 
 std::vector<AxisOutcome> ActuatorBank::reconnectMissing(Timeout timeout) {
   std::vector<AxisOutcome> outcomes;
+  outcomes.reserve(axes_.size());
   for (Actuator& axis : axes_) outcomes.push_back(axis.reconnect(timeout));
   return outcomes;
 }

@@ -11,6 +11,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kInterface = 0;
+// So that a mute device does not use up the time in which the others could be asked.
+constexpr std::chrono::milliseconds kSerialWait{50};
 
 std::chrono::milliseconds left(Clock::time_point deadline) {
   return std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
@@ -114,7 +116,8 @@ UsbTransport::Connection UsbTransport::tryDevice(libusb_device* device, const Wa
     return {nullptr, faultOfOpening(status), where + ": " + libusb_error_name(status)};
   }
   auto link = std::make_shared<UsbLink>(shared_from_this(), handle, descriptor.idProduct);
-  if (const ActuatorFault fault = readSerial(*link, descriptor.iSerialNumber, deadline);
+  const Clock::time_point patience = std::min(deadline, Clock::now() + kSerialWait);
+  if (const ActuatorFault fault = readSerial(*link, descriptor.iSerialNumber, patience);
       fault != ActuatorFault::kNone) {
     return {nullptr, fault, where + ": reading its serial number"};
   }

@@ -59,6 +59,7 @@ struct FakeTic {
 
 std::vector<int> codesOf(const ScriptRun& run) {
   std::vector<int> codes;
+  codes.reserve(run.sent.size());
   for (const UsbRequest& request : run.sent) codes.push_back(request.code);
   return codes;
 }

@@ -16,7 +16,7 @@ struct ScriptRun {
 };
 
 /// Plays a script against a device that answers each request from its bytes.
-inline ScriptRun play(UsbScript script,
+inline ScriptRun play(const UsbScript& script,
                       const std::function<std::vector<std::uint8_t>(const UsbRequest&)>& device) {
   ScriptRun run;
   UsbStep step = script(nullptr);

@@ -131,6 +131,18 @@ TEST(ActuatorFaults, ADeviceIsAlsoFoundByItsPort) {
   EXPECT_FALSE(ActuatorBank::create(axes).ok()) << "one device for two axes";
 }
 
+TEST(ActuatorFaults, AMuteDeviceDoesNotHideTheOthers) {
+  const auto usb = VirtualUsb::create(ticSpecs(3));
+  ASSERT_TRUE(usb.ok()) << usb.error().message();
+  usb.value()->inject(0, VirtualFault::kMute, 1'000'000);
+  auto bank = ActuatorBank::create(ticAxes(3));
+  ASSERT_TRUE(bank.ok());
+  const std::vector<AxisOutcome> outcomes = bank->reconnectMissing(kConnectTimeout);
+  EXPECT_EQ(outcomes[0].fault, ActuatorFault::kTimeout);
+  EXPECT_TRUE(outcomes[1].ok());
+  EXPECT_TRUE(outcomes[2].ok());
+}
+
 TEST(ActuatorFaults, SlowAnswersAreWaitedForUpToTheTimeout) {
   VirtualRig rig(1);
   rig.usb->setLatency(0, std::chrono::milliseconds(20));

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 
 #include "virtual_rig.h"
@@ -156,6 +157,24 @@ TEST(ActuatorMotion, SupplyAndDriverErrorsAreSeenAndSwitchTheMotorOff) {
     rig.usb->clear(0, fault);
     EXPECT_TRUE(rig.bank.axis(0).clearDriverError().ok());
   }
+}
+
+TEST(ActuatorMotion, WhatHangsOnAnAxisIsToldWhereItIs) {
+  VirtualRig rig(2);
+  rig.release();
+  std::atomic<double> seen_units{0.0};
+  std::atomic<int> calls{0};
+  rig.usb->observe([&](int device, const VirtualActuatorState& state) {
+    if (device == 1) seen_units = state.position_units;
+    ++calls;
+  });
+  ASSERT_TRUE(rig.bank.axis(1).setTarget(0.0003).ok());
+  ASSERT_TRUE(keepAliveUntil(rig, 2.0, [&] { return std::abs(seen_units - 1300.0) < 0.5; }));
+  EXPECT_GT(calls, 20);
+  rig.usb->observe(nullptr);
+  const int then = calls;
+  sleepFor(0.02);
+  EXPECT_EQ(calls, then);
 }
 
 TEST(ActuatorMotion, ReadingsDoNotKeepAnAxisMoving) {

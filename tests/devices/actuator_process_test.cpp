@@ -2,11 +2,12 @@
 // Programs of their own on the virtual bus: a client that dies, and peers that are not ours.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/wait.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
+#include <set>
 
 #include "tenter/test_support/temporary_folder.h"
 #include "virtual_rig.h"
@@ -112,6 +113,18 @@ TEST_F(ForeignPrograms, ListTheDevices) {
   }
 }
 
+TEST_F(ForeignPrograms, NeedTwoVariablesAndNothingElse) {
+  const std::unique_ptr<VirtualUsb> usb = makeBus();
+  ASSERT_NE(usb, nullptr);
+  const test_support::TemporaryFolder folder;
+  std::vector<std::string> command = {"env", "-i"};
+  for (const std::string& variable : usb->environment()) command.push_back(variable);
+  command.push_back("lsusb");
+  const Result<int> code = usb->run(command, folder / "out");
+  ASSERT_TRUE(code.ok()) << code.error().message();
+  EXPECT_THAT(slurp(folder / "out"), HasSubstr("1ffb:00c9"));
+}
+
 TEST_F(ForeignPrograms, DriveThem) {
   const std::unique_ptr<VirtualUsb> usb = makeBus();
   ASSERT_NE(usb, nullptr);
@@ -130,6 +143,18 @@ TEST_F(ForeignPrograms, MissingOnesAreReported) {
   const Result<int> code = usb->run({"there-is-no-such-program"});
   ASSERT_FALSE(code.ok());
   EXPECT_THAT(code.error().message(), HasSubstr("there-is-no-such-program"));
+}
+
+TEST(VirtualFaults, EachHasAName) {
+  std::set<VirtualFault> faults;
+  std::set<std::string_view> names;
+  for (const VirtualFaultRow& row : virtualFaults()) {
+    faults.insert(row.fault);
+    names.insert(row.name);
+  }
+  const auto last = static_cast<std::size_t>(VirtualFault::kSettingsLocked);
+  EXPECT_EQ(faults.size(), last + 1);
+  EXPECT_EQ(names.size(), last + 1);
 }
 
 }  // namespace

@@ -58,6 +58,7 @@ Result<pid_t> VirtualUsb::spawn(const std::vector<std::string>& arguments,
   require(!arguments.empty(), "a program to start has a name");
   std::vector<std::string> copies = arguments;
   std::vector<char*> raw;
+  raw.reserve(copies.size() + 1);
   for (std::string& copy : copies) raw.push_back(copy.data());
   raw.push_back(nullptr);
   posix_spawn_file_actions_t files;

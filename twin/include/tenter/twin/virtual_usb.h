@@ -83,7 +83,7 @@ class VirtualUsb {
   VirtualActuatorState state(int device) const;
 
   /// Called every 2 ms for every device on a thread of the bus, plugged or not; replaces the one
-  /// before, and once this returns that one is called no more.
+  /// before, and once this returns that one is called no more. It must not call observe() itself.
   using Observer = std::function<void(int device, const VirtualActuatorState& state)>;
   void observe(Observer observer);
 
