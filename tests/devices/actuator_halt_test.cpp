@@ -13,16 +13,19 @@ namespace tenter::device_test {
 namespace {
 
 constexpr int kRuns = 100;
-constexpr double kHaltBound_s = 0.025;  // of all eight, from the call to the last answer
+constexpr double kHaltBound_s =
+    0.025;  // 99th percentile, all eight, from the call to the last answer
 constexpr double kSpeed_m_per_s = 0.002;
 
-void printQuantiles(const char* what, std::vector<double>& seconds) {
+/// Prints the quantiles and returns the 99th percentile [s].
+double reportQuantiles(const char* what, std::vector<double> seconds) {
   std::sort(seconds.begin(), seconds.end());
   const auto quantile = [&](double q) {
-    return 1e3 * seconds[static_cast<std::size_t>(q * static_cast<double>(seconds.size() - 1))];
+    return seconds[static_cast<std::size_t>(q * static_cast<double>(seconds.size() - 1))];
   };
   std::printf("%s: n %zu, p50 %.2f ms, p99 %.2f ms, max %.2f ms\n", what, seconds.size(),
-              quantile(0.5), quantile(0.99), quantile(1.0));
+              1e3 * quantile(0.5), 1e3 * quantile(0.99), 1e3 * quantile(1.0));
+  return quantile(0.99);
 }
 
 bool allOk(const std::vector<AxisOutcome>& outcomes) {
@@ -37,33 +40,32 @@ TEST(ActuatorHalt, EightAxesHaltTogether) {
     rig.bank.allowMotion();
     for (int i = 0; i < kAxes; ++i) {
       const double sign = run % 2 == 0 ? 1.0 : -1.0;
-      ASSERT_TRUE(rig.bank.axis(i).setVelocity(sign * kSpeed_m_per_s).ok());
+      ASSERT_TRUE(rig.bank.axis(i).setVelocity(sign * kSpeed_m_per_s, kPatience).ok());
     }
     auto start = std::chrono::steady_clock::now();
-    for (const AxisReading& reading : rig.bank.pollAll()) ASSERT_TRUE(reading.status);
+    for (const AxisReading& reading : rig.bank.pollAll(kPatience)) ASSERT_TRUE(reading.status);
     polls.push_back(secondsSince(start));
     start = std::chrono::steady_clock::now();
-    ASSERT_TRUE(allOk(rig.bank.haltAll()));
+    ASSERT_TRUE(allOk(rig.bank.haltAll(kPatience)));
     halts.push_back(secondsSince(start));
     for (int i = 0; i < kAxes; ++i) EXPECT_EQ(rig.usb->state(i).velocity_units_per_s, 0.0);
   }
-  printQuantiles("poll of eight axes", polls);
-  printQuantiles("halt of eight axes", halts);
-  EXPECT_LT(halts.back(), kHaltBound_s);
+  reportQuantiles("poll of eight axes", polls);
+  EXPECT_LT(reportQuantiles("halt of eight axes", halts), kHaltBound_s);
 }
 
 TEST(ActuatorHalt, CutsShortAnOrderThatWaitsForAMuteDevice) {
   VirtualRig rig(kAxes);
   rig.release();
   for (int i = 0; i < kAxes; ++i) {
-    ASSERT_TRUE(rig.bank.axis(i).setVelocity(kSpeed_m_per_s).ok());
+    ASSERT_TRUE(rig.bank.axis(i).setVelocity(kSpeed_m_per_s, kPatience).ok());
     rig.usb->inject(i, VirtualFault::kMute, 1, tic::command::kGetVariable);
   }
   std::vector<AxisReading> readings;
   std::thread poll([&] { readings = rig.bank.pollAll(Actuator::Timeout{1000}); });
   sleepFor(0.03);
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<AxisOutcome> outcomes = rig.bank.haltAll();
+  const std::vector<AxisOutcome> outcomes = rig.bank.haltAll(kPatience);
   const double took_s = secondsSince(start);
   poll.join();
   EXPECT_TRUE(allOk(outcomes));
@@ -103,11 +105,12 @@ TEST(ActuatorHalt, NoOrderUndoesItUntilMotionIsAllowedAgain) {
 TEST(ActuatorHalt, OneAxisIsHaltedWhileTheOthersGoOn) {
   VirtualRig rig(2);
   rig.release();
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(rig.bank.axis(i).setVelocity(kSpeed_m_per_s).ok());
-  ASSERT_TRUE(rig.bank.axis(0).haltAndHold().ok());
+  for (int i = 0; i < 2; ++i)
+    ASSERT_TRUE(rig.bank.axis(i).setVelocity(kSpeed_m_per_s, kPatience).ok());
+  ASSERT_TRUE(rig.bank.axis(0).haltAndHold(kPatience).ok());
   EXPECT_EQ(rig.usb->state(0).velocity_units_per_s, 0.0);
   EXPECT_GT(rig.usb->state(1).velocity_units_per_s, 0.0);
-  EXPECT_TRUE(rig.bank.axis(0).status().status->position_uncertain);
+  EXPECT_TRUE(rig.bank.axis(0).status(kPatience).status->position_uncertain);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ template <class Done>
 bool keepAliveUntil(VirtualRig& rig, double limit_s, Done done) {
   const auto start = std::chrono::steady_clock::now();
   while (secondsSince(start) < limit_s) {
-    rig.bank.keepAliveAll();
+    rig.bank.keepAliveAll(kPatience);
     if (done()) return true;
     sleepFor(0.01);
   }
@@ -30,7 +30,7 @@ TEST(ActuatorMotion, EveryModelIsIdentifiedWithItsSettingsInForce) {
   VirtualRig rig(kAxes);
   const std::vector<std::string> models = {"Tic T825", "Tic T834", "Tic T500", "Tic N825",
                                            "Tic T249", "Tic 36v4", "Tic T825", "Tic T834"};
-  const std::vector<AxisReading> readings = rig.bank.pollAll();
+  const std::vector<AxisReading> readings = rig.bank.pollAll(kPatience);
   for (int i = 0; i < kAxes; ++i) {
     const auto identity = rig.bank.axis(i).identity();
     ASSERT_TRUE(identity);
@@ -50,30 +50,30 @@ TEST(ActuatorMotion, EveryModelIsIdentifiedWithItsSettingsInForce) {
 
 TEST(ActuatorMotion, TargetIsReachedAndNothingMovesBeforeSafeStartIsLeft) {
   VirtualRig rig(1);
-  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.0008).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.0008, kPatience).ok());
   sleepFor(0.05);
   EXPECT_EQ(rig.usb->state(0).position_units, 1000.0);
   rig.release();
   sleepFor(0.05);
   EXPECT_EQ(rig.usb->state(0).position_units, 1000.0) << "the old target came back to life";
-  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.0008).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.0008, kPatience).ok());
   EXPECT_TRUE(keepAliveUntil(rig, 2.0, [&] {
-    const AxisReading reading = rig.bank.axis(0).status();
+    const AxisReading reading = rig.bank.axis(0).status(kPatience);
     return reading.status && std::abs(reading.status->position_m - 0.0008) < kOneMicrostep_m;
   }));
   EXPECT_NEAR(rig.usb->state(0).position_units, 1800.0, 1.0);
-  EXPECT_EQ(*rig.bank.axis(0).status().status->velocity_m_per_s, 0.0);
+  EXPECT_EQ(*rig.bank.axis(0).status(kPatience).status->velocity_m_per_s, 0.0);
 }
 
 TEST(ActuatorMotion, SpeedIsThatOfTheOrderAndOfTheLimit) {
   VirtualRig rig(1);
   rig.release();
-  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.002).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.002, kPatience).ok());
   keepAliveUntil(rig, 0.2, [] { return false; });
-  EXPECT_NEAR(*rig.bank.axis(0).status().status->velocity_m_per_s, 0.002, 1e-9);
-  ASSERT_TRUE(rig.bank.axis(0).setSpeedLimit(0.001).ok());
+  EXPECT_NEAR(*rig.bank.axis(0).status(kPatience).status->velocity_m_per_s, 0.002, 1e-9);
+  ASSERT_TRUE(rig.bank.axis(0).setSpeedLimit(0.001, kPatience).ok());
   keepAliveUntil(rig, 0.2, [] { return false; });
-  EXPECT_NEAR(*rig.bank.axis(0).status().status->velocity_m_per_s, 0.001, 1e-9);
+  EXPECT_NEAR(*rig.bank.axis(0).status(kPatience).status->velocity_m_per_s, 0.001, 1e-9);
 }
 
 TEST(ActuatorMotion, AnAxisMountedTheOtherWayRoundHasItsOwnDirections) {
@@ -81,10 +81,10 @@ TEST(ActuatorMotion, AnAxisMountedTheOtherWayRoundHasItsOwnDirections) {
   axes[0].metres_per_unit = -kMetresPerMicrostep;
   VirtualRig rig(ticSpecs(1), axes);
   rig.release();
-  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003, kPatience).ok());
   ASSERT_TRUE(keepAliveUntil(rig, 2.0, [&] { return rig.usb->state(0).position_units <= 0.0; }));
   sleepFor(0.02);
-  const AxisReading reading = rig.bank.axis(0).status();
+  const AxisReading reading = rig.bank.axis(0).status(kPatience);
   ASSERT_TRUE(reading.status);
   EXPECT_TRUE(reading.status->at_max);
   EXPECT_FALSE(reading.status->at_min);
@@ -94,14 +94,17 @@ TEST(ActuatorMotion, AnAxisMountedTheOtherWayRoundHasItsOwnDirections) {
 TEST(ActuatorMotion, HomingFindsTheSwitchAndSetsTheOrigin) {
   VirtualRig rig(1);
   rig.release();
-  ASSERT_TRUE(rig.bank.axis(0).setVelocity(-0.004).ok());  // near the switch first: homing is slow
+  ASSERT_TRUE(rig.bank.axis(0)
+                  .setVelocity(-0.004, kPatience)
+                  .ok());  // near the switch first: homing is slow
   ASSERT_TRUE(keepAliveUntil(rig, 2.0, [&] { return rig.usb->state(0).position_units < 20.0; }));
-  ASSERT_TRUE(rig.bank.axis(0).haltAndHold().ok());
+  ASSERT_TRUE(rig.bank.axis(0).haltAndHold(kPatience).ok());
   rig.bank.allowMotion();
-  ASSERT_TRUE(rig.bank.axis(0).goHome(HomeTowards::kMin).ok());
-  EXPECT_TRUE(rig.bank.axis(0).status().status->homing);
-  ASSERT_TRUE(keepAliveUntil(rig, 3.0, [&] { return !rig.bank.axis(0).status().status->homing; }));
-  const ActuatorStatus status = *rig.bank.axis(0).status().status;
+  ASSERT_TRUE(rig.bank.axis(0).goHome(HomeTowards::kMin, kPatience).ok());
+  EXPECT_TRUE(rig.bank.axis(0).status(kPatience).status->homing);
+  ASSERT_TRUE(
+      keepAliveUntil(rig, 3.0, [&] { return !rig.bank.axis(0).status(kPatience).status->homing; }));
+  const ActuatorStatus status = *rig.bank.axis(0).status(kPatience).status;
   EXPECT_FALSE(status.position_uncertain);
   EXPECT_NEAR(status.position_m, 0.0, kOneMicrostep_m);
   EXPECT_NEAR(rig.usb->state(0).position_units, 0.0, 1.0);
@@ -125,14 +128,14 @@ TEST(ActuatorMotion, AStopSwitchAndAKillSwitchAreSeenAndObeyed) {
   VirtualRig rig(1);
   rig.release();
   rig.settle();
-  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003, kPatience).ok());
   rig.usb->inject(0, VirtualFault::kForwardLimit);
-  const ActuatorStatus limited = *rig.bank.axis(0).status().status;
+  const ActuatorStatus limited = *rig.bank.axis(0).status(kPatience).status;
   EXPECT_TRUE(limited.at_max);
   EXPECT_EQ(rig.usb->state(0).velocity_units_per_s, 0.0);
   rig.usb->clear(0, VirtualFault::kForwardLimit);
   rig.usb->inject(0, VirtualFault::kKillSwitch);
-  const ActuatorStatus killed = *rig.bank.axis(0).status().status;
+  const ActuatorStatus killed = *rig.bank.axis(0).status(kPatience).status;
   EXPECT_EQ(killed.state, ActuatorState::kSoftError);
   EXPECT_THAT(actuatorErrorNames(killed.errors), ElementsAre("kill-switch", "safe-start"));
   EXPECT_EQ(rig.usb->state(0).velocity_units_per_s, 0.0);
@@ -147,9 +150,9 @@ TEST(ActuatorMotion, SupplyAndDriverErrorsAreSeenAndSwitchTheMotorOff) {
                                     std::pair{VirtualFault::kDriverError, "driver-error"}}) {
     rig.release();
     rig.settle();
-    ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003).ok());
+    ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003, kPatience).ok());
     rig.usb->inject(0, fault);
-    const ActuatorStatus status = *rig.bank.axis(0).status().status;
+    const ActuatorStatus status = *rig.bank.axis(0).status(kPatience).status;
     EXPECT_EQ(status.state, ActuatorState::kReset);
     EXPECT_FALSE(status.energised);
     EXPECT_THAT(actuatorErrorNames(status.errors), ElementsAre(name, "safe-start"));
@@ -168,7 +171,7 @@ TEST(ActuatorMotion, WhatHangsOnAnAxisIsToldWhereItIs) {
     if (device == 1) seen_units = state.position_units;
     ++calls;
   });
-  ASSERT_TRUE(rig.bank.axis(1).setTarget(0.0003).ok());
+  ASSERT_TRUE(rig.bank.axis(1).setTarget(0.0003, kPatience).ok());
   ASSERT_TRUE(keepAliveUntil(rig, 2.0, [&] { return std::abs(seen_units - 1300.0) < 0.5; }));
   EXPECT_GT(calls, 20);
   rig.usb->observe(nullptr);
@@ -180,11 +183,11 @@ TEST(ActuatorMotion, WhatHangsOnAnAxisIsToldWhereItIs) {
 TEST(ActuatorMotion, ReadingsDoNotKeepAnAxisMoving) {
   VirtualRig rig(1);
   rig.release();
-  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.003, kPatience).ok());
   const auto start = std::chrono::steady_clock::now();
-  while (secondsSince(start) < 0.25) rig.bank.pollAll();
+  while (secondsSince(start) < 0.25) rig.bank.pollAll(kPatience);
   EXPECT_EQ(rig.usb->state(0).velocity_units_per_s, 0.0);
-  const ActuatorStatus status = *rig.bank.axis(0).status().status;
+  const ActuatorStatus status = *rig.bank.axis(0).status(kPatience).status;
   EXPECT_THAT(actuatorErrorNames(status.errors), ElementsAre("command-timeout", "safe-start"));
 }
 

@@ -26,15 +26,16 @@ int main(int argc, char** argv) {
   for (const AxisOutcome& outcome : bank->reconnectMissing(device_test::kConnectTimeout)) {
     if (!outcome.ok()) return complain(outcome.error().message());
   }
+  const Actuator::Timeout patience = device_test::kPatience;
   for (int i = 0; i < bank->size(); ++i) {
     for (const AxisOutcome& outcome :
-         {bank->axis(i).energise(), bank->axis(i).exitSafeStart(),
-          bank->axis(i).setVelocity(0.5 * bank->axis(i).config().max_speed_m_per_s)}) {
+         {bank->axis(i).energise(patience), bank->axis(i).exitSafeStart(patience),
+          bank->axis(i).setVelocity(0.5 * bank->axis(i).config().max_speed_m_per_s, patience)}) {
       if (!outcome.ok()) return complain(outcome.error().message());
     }
   }
   for (;;) {
-    for (const AxisOutcome& outcome : bank->keepAliveAll()) {
+    for (const AxisOutcome& outcome : bank->keepAliveAll(patience)) {
       if (!outcome.ok()) return complain(outcome.error().message());
     }
     device_test::sleepFor(0.02);

@@ -20,7 +20,7 @@ TEST(Lac, IsIdentifiedAndHeldWhereItStands) {
   LacRig rig;
   EXPECT_EQ(rig.bank.axis(0).identity()->model, "Actuonix LAC");
   EXPECT_EQ(rig.bank.axis(0).identity()->serial, "LAC-7");
-  const ActuatorStatus status = *rig.bank.axis(0).status().status;
+  const ActuatorStatus status = *rig.bank.axis(0).status(kPatience).status;
   EXPECT_NEAR(status.position_m, 0.03, kMetresPerCount);
   EXPECT_EQ(status.command_timeout.count(), 0) << "it has none of its own";
   EXPECT_FALSE(status.velocity_m_per_s);
@@ -31,10 +31,10 @@ TEST(Lac, IsIdentifiedAndHeldWhereItStands) {
 
 TEST(Lac, ReachesItsGoalAtTheSetSpeedWhileItIsKeptAlive) {
   LacRig rig;
-  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.034).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.034, kPatience).ok());
   const auto start = std::chrono::steady_clock::now();
   while (std::abs(rig.usb->state(0).position_units - 340.0) > 0.5 && secondsSince(start) < 2.0) {
-    ASSERT_TRUE(rig.bank.axis(0).keepAlive().ok());
+    ASSERT_TRUE(rig.bank.axis(0).keepAlive(kPatience).ok());
     sleepFor(0.02);
   }
   const double took_s = secondsSince(start);
@@ -45,7 +45,7 @@ TEST(Lac, ReachesItsGoalAtTheSetSpeedWhileItIsKeptAlive) {
 
 TEST(Lac, WithoutItsHostItGoesNoFurtherThanItsLead) {
   LacRig rig;
-  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.09).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.09, kPatience).ok());
   sleepFor(0.4);
   EXPECT_LE(rig.usb->state(0).position_units, 300.0 + kLead_units);
   EXPECT_EQ(rig.usb->state(0).velocity_units_per_s, 0.0);
@@ -54,20 +54,20 @@ TEST(Lac, WithoutItsHostItGoesNoFurtherThanItsLead) {
 
 TEST(Lac, HaltsWhereItIsAndForgetsItsGoal) {
   LacRig rig;
-  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.01).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setVelocity(0.01, kPatience).ok());
   for (int i = 0; i < 5; ++i) {
-    ASSERT_TRUE(rig.bank.axis(0).keepAlive().ok());
+    ASSERT_TRUE(rig.bank.axis(0).keepAlive(kPatience).ok());
     sleepFor(0.02);
   }
-  ASSERT_TRUE(rig.bank.axis(0).haltAndHold().ok());
+  ASSERT_TRUE(rig.bank.axis(0).haltAndHold(kPatience).ok());
   const double halted_at = rig.usb->state(0).position_units;
   EXPECT_GT(halted_at, 302.0);
   for (int i = 0; i < 5; ++i) {
-    ASSERT_TRUE(rig.bank.axis(0).keepAlive().ok());
+    ASSERT_TRUE(rig.bank.axis(0).keepAlive(kPatience).ok());
     sleepFor(0.02);
   }
   EXPECT_NEAR(rig.usb->state(0).position_units, halted_at, kOneCount);
-  EXPECT_EQ(rig.bank.axis(0).setTarget(0.05).fault, ActuatorFault::kHalted);
+  EXPECT_EQ(rig.bank.axis(0).setTarget(0.05, kPatience).fault, ActuatorFault::kHalted);
 }
 
 TEST(Lac, NamesEveryFaultAndRecovers) {
@@ -78,20 +78,20 @@ TEST(Lac, NamesEveryFaultAndRecovers) {
         std::pair{VirtualFault::kMute, ActuatorFault::kTimeout}}) {
     rig.usb->inject(0, injected);
     EXPECT_EQ(rig.bank.axis(0).status().outcome.fault, seen);
-    EXPECT_TRUE(rig.bank.axis(0).status().status);
+    EXPECT_TRUE(rig.bank.axis(0).status(kPatience).status);
   }
   rig.usb->inject(0, VirtualFault::kShortReply);
   EXPECT_EQ(rig.bank.axis(0).status().outcome.fault, ActuatorFault::kShortReply);
-  EXPECT_TRUE(rig.bank.axis(0).status().status);
+  EXPECT_TRUE(rig.bank.axis(0).status(kPatience).status);
   rig.usb->inject(0, VirtualFault::kUnplugInTransfer);
-  EXPECT_EQ(rig.bank.axis(0).status().outcome.fault, ActuatorFault::kUnplugged);
+  EXPECT_EQ(rig.bank.axis(0).status(kConnectTimeout).outcome.fault, ActuatorFault::kUnplugged);
   ASSERT_TRUE(rig.usb->replug(0).ok());
   EXPECT_TRUE(rig.bank.reconnectMissing(kConnectTimeout)[0].ok());
 }
 
 TEST(Lac, AnAnswerThatComesLateIsNotTakenForTheNext) {
   LacRig rig;
-  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.04).ok());
+  ASSERT_TRUE(rig.bank.axis(0).setTarget(0.04, kPatience).ok());
   // The question goes through and its answer is given up: it stays in the device's pipe.
   rig.usb->setLatency(0, std::chrono::milliseconds(30));
   EXPECT_EQ(rig.bank.axis(0).status(Actuator::Timeout{45}).outcome.fault, ActuatorFault::kTimeout);
@@ -110,10 +110,10 @@ TEST(Lac, AndTicsHaltTogether) {
   axes.push_back(lacAxis());
   VirtualRig rig(specs, axes);
   rig.release();
-  for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.bank.axis(i).setVelocity(0.004).ok());
-  ASSERT_TRUE(rig.bank.keepAliveAll()[2].ok());
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.bank.axis(i).setVelocity(0.004, kPatience).ok());
+  ASSERT_TRUE(rig.bank.keepAliveAll(kPatience)[2].ok());
   sleepFor(0.05);
-  for (const AxisOutcome& outcome : rig.bank.haltAll()) {
+  for (const AxisOutcome& outcome : rig.bank.haltAll(kPatience)) {
     EXPECT_TRUE(outcome.ok()) << outcome.error().message();
   }
   sleepFor(0.03);

@@ -37,7 +37,7 @@ assert variable(0x26, "<i") > 0
 for _ in range(20):
     quick(0x8C)
     time.sleep(0.1)
-    if variable(0x22, "<i") == 50:
+    if variable(0x22, "<i") == 50 and variable(0x26, "<i") == 0:
         break
 assert variable(0x22, "<i") == 50 and variable(0x26, "<i") == 0
 time.sleep(1.1)

@@ -83,15 +83,15 @@ VirtualRig::VirtualRig(std::vector<VirtualActuatorSpec> specs, std::vector<AxisC
 
 void VirtualRig::release() {
   for (int i = 0; i < bank.size(); ++i) {
-    check(bank.axis(i).energise());
-    check(bank.axis(i).exitSafeStart());
+    check(bank.axis(i).energise(kPatience));
+    check(bank.axis(i).exitSafeStart(kPatience));
   }
 }
 
 void VirtualRig::settle() {
   const auto start = std::chrono::steady_clock::now();
   while (secondsSince(start) < 0.21) {
-    bank.keepAliveAll();
+    bank.keepAliveAll(kPatience);
     sleepFor(0.02);
   }
 }

@@ -13,6 +13,8 @@ inline constexpr int kAxes = 8;
 inline constexpr double kMetresPerMicrostep = 1e-6;
 inline constexpr double kMetresPerCount = 1e-4;  // a LAC with 102 mm of stroke
 inline constexpr std::chrono::milliseconds kConnectTimeout{1000};
+/// Of orders whose time is not what a test is about: a busy machine may answer late.
+inline constexpr std::chrono::milliseconds kPatience{500};
 
 /// Tics with serial numbers 00000001 and on, one of each model in turn.
 std::vector<VirtualActuatorSpec> ticSpecs(int count);
