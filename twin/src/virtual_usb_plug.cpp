@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The device's entries in sysfs, plugging, unplugging, and the faults asked for.
+// The device's entries in sysfs; plugging and unplugging.
 #include <array>
 #include <cstdio>
 
-#include "virtual_usb_device.h"
+#include "virtual_usb_node.h"
 
 namespace tenter {
 namespace {
 
 VirtualUsbModel::Time timeNow() { return std::chrono::steady_clock::now().time_since_epoch(); }
-
-gboolean onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, VirtualUsbDevice* device) {
-  return device->handle(client) ? TRUE : FALSE;
-}
-
-gboolean onRead(UMockdevIoctlBase*, UMockdevIoctlClient* client, VirtualUsbDevice* device) {
-  return device->read(client) ? TRUE : FALSE;
-}
 
 std::unique_ptr<VirtualUsbModel> makeModel(const VirtualActuatorSpec& spec) {
   return spec.driver == "lac" ? makeVirtualLac(spec) : makeVirtualTic(spec);
@@ -32,13 +24,6 @@ std::string hexadecimal(const std::vector<std::uint8_t>& bytes) {
   std::string text;
   for (const std::uint8_t byte : bytes) text += formatted("%02X", byte);
   return text;
-}
-
-bool lasts(VirtualFault fault) {
-  for (const VirtualFaultRow& row : virtualFaults()) {
-    if (row.fault == fault) return row.lasts;
-  }
-  return false;
 }
 
 }  // namespace
@@ -128,95 +113,45 @@ bool VirtualUsbDevice::describe(int address, std::string& error) {
 
 Result<void> VirtualUsbDevice::plug(int address) {
   const std::lock_guard plugging(plugging_);
+  if (node_ != nullptr) return {};
   {
     const std::lock_guard lock(mutex_);
-    if (!gone_) return {};
-    dropUrbs();
     model_->advanceTo(timeNow());
     model_->powerUp(timeNow());
-    gone_ = false;
     unplug_at_.reset();
+    plugged_ = true;
   }
-  node_ = formatted("/dev/bus/usb/001/%03d", address);
-  handler_ = umockdev_ioctl_base_new();
-  g_object_connect(handler_, "signal-after::handle-ioctl", G_CALLBACK(onIoctl), this,
-                   "signal-after::handle-read", G_CALLBACK(onRead), this, nullptr);
-  GError* problem = nullptr;
-  std::string reason;
-  if (!umockdev_testbed_attach_ioctl(testbed_, node_.c_str(), handler_, &problem)) {
-    reason = problem->message;
-    g_error_free(problem);
-  } else if (describe(address, reason)) {
+  node_ = std::make_unique<VirtualUsbNode>(*this, testbed_,
+                                           formatted("/dev/bus/usb/001/%03d", address));
+  std::string reason = node_->attach();
+  if (reason.empty() && describe(address, reason)) {
     umockdev_testbed_uevent(testbed_, system_path_.c_str(), "add");
     return {};
   }
-  g_clear_object(&handler_);
+  node_.reset();
   const std::lock_guard lock(mutex_);
-  gone_ = true;
+  plugged_ = false;
   return Error{ErrorKind::kHardware, "", "virtual device " + spec_.serial,
                "it cannot be plugged in: " + reason, ""};
 }
 
 void VirtualUsbDevice::unplug() {
   const std::lock_guard plugging(plugging_);
+  if (node_ == nullptr) return;
+  node_->kill();
   {
     const std::lock_guard lock(mutex_);
-    if (gone_) return;
     model_->advanceTo(timeNow());
-    gone_ = true;
     unplug_at_.reset();
+    plugged_ = false;
   }
   umockdev_testbed_uevent(testbed_, system_path_.c_str(), "remove");
-  umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
+  node_->detach();
   // The interface by itself: its link among the bus' devices outlives the removal of its parent.
   umockdev_testbed_remove_device(testbed_, (system_path_ + formatted("/1-%d:1.0", port_)).c_str());
   umockdev_testbed_remove_device(testbed_, system_path_.c_str());
-  g_clear_object(&handler_);
-  const std::lock_guard lock(mutex_);
-  dropUrbs();
-}
-
-void VirtualUsbDevice::inject(VirtualFault fault, int count,
-                              std::optional<std::uint8_t> only_request) {
-  const std::lock_guard lock(mutex_);
-  if (lasts(fault)) {
-    model_->advanceTo(timeNow());
-    model_->setCondition(fault, true);
-  } else {
-    faults_[fault] = {count, only_request};
-  }
-}
-
-void VirtualUsbDevice::clear(VirtualFault fault) {
-  const std::lock_guard lock(mutex_);
-  faults_.erase(fault);
-  if (!lasts(fault)) return;
-  model_->advanceTo(timeNow());
-  model_->setCondition(fault, false);
-}
-
-void VirtualUsbDevice::setLatency(std::chrono::microseconds latency) {
-  const std::lock_guard lock(mutex_);
-  latency_ = latency;
-}
-
-VirtualActuatorState VirtualUsbDevice::tick() {
-  bool due = false;
-  {
-    const std::lock_guard lock(mutex_);
-    due = unplug_at_ && timeNow() >= *unplug_at_;
-  }
-  if (due) unplug();
-  return state();
-}
-
-VirtualActuatorState VirtualUsbDevice::state() {
-  const std::lock_guard lock(mutex_);
-  model_->advanceTo(timeNow());
-  VirtualActuatorState state = model_->state();
-  state.plugged = !gone_;
-  state.transfers = transfers_;
-  return state;
+  // Not freed: a client may still be answered, and may be stopped while it is.
+  dead_nodes_.push_back(std::move(node_));
 }
 
 }  // namespace tenter

@@ -65,7 +65,9 @@ const std::vector<VirtualFaultRow>& virtualFaults();
 
 /// A bus of virtual actuators that programs see through the real libusb and the real paths of
 /// Linux: they are told of it by two variables of their environment and need no change. Faults and
-/// unplugging may be called from any thread.
+/// unplugging may be called from any thread. One thread answers all programs: one that is stopped
+/// (SIGSTOP) in the middle of a transfer keeps the others waiting, but not the mechanics; end it
+/// before the bus.
 class VirtualUsb {
  public:
   /// To be called first thing in main() of a program that serves virtual devices: starts the
