@@ -26,6 +26,10 @@ target_link_libraries(tenter_cholmod INTERFACE ${CHOLMOD_LIBRARY})
 # HDF5 without MPI, even where its parallel build is installed too.
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET GLOBAL hdf5-serial)
+if(TENTER_HARDWARE)
+  pkg_check_modules(libusb REQUIRED IMPORTED_TARGET GLOBAL libusb-1.0>=1.0.26)
+  pkg_check_modules(umockdev REQUIRED IMPORTED_TARGET GLOBAL umockdev-1.0>=0.17 gobject-2.0)
+endif()
 
 # tests only
 find_package(GTest 1.12 REQUIRED)
