@@ -22,6 +22,12 @@ add_library(tenter::cholmod ALIAS tenter_cholmod)
 target_include_directories(tenter_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
 target_link_libraries(tenter_cholmod INTERFACE ${CHOLMOD_LIBRARY})
 
+if(TENTER_HARDWARE)
+  find_package(PkgConfig REQUIRED)
+  pkg_check_modules(MODBUS REQUIRED IMPORTED_TARGET GLOBAL libmodbus>=3.1.6)
+  add_library(tenter::modbus ALIAS PkgConfig::MODBUS)
+endif()
+
 # tests only
 find_package(GTest 1.12 REQUIRED)
 find_package(valijson REQUIRED)

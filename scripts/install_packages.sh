@@ -10,8 +10,11 @@ packages=(
   # libraries
   libeigen3-dev libceres-dev libsuitesparse-dev libopenblas-pthread-dev libopenblas0-pthread libtbb-dev
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev libssl-dev libvtk9-dev
+  # libraries that talk to devices
+  libmodbus-dev
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-numpy python3-jsonschema
+  mbpoll python3-pymodbus python3-serial
 )
 
 if [[ "${1:-}" == --list ]]; then
