@@ -72,7 +72,10 @@ LoadCellFault LoadCellPlausibility::judgeValue(const DecodedWeights& weights) co
 LoadCellFault LoadCellPlausibility::judge(const DecodedWeights& weights, std::int64_t stamp_ns) {
   const bool stuck = isStuck(weights, stamp_ns);
   LoadCellFault fault = weights.fault;
-  if (fault == LoadCellFault::kNone) fault = judgeValue(weights);
+  if (fault == LoadCellFault::kNone || fault == LoadCellFault::kInconsistent) {
+    const LoadCellFault value_fault = judgeValue(weights);  // says more than a sum that fails
+    if (value_fault != LoadCellFault::kNone) fault = value_fault;
+  }
   if (fault == LoadCellFault::kNone && stuck) fault = LoadCellFault::kStuck;
   if (startsProbation(fault)) good_to_come_ = kProbationSamples;
   if (fault == LoadCellFault::kNone && good_to_come_ > 0) {

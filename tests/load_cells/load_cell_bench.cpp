@@ -20,6 +20,7 @@ Bench::Bench(const BenchOptions& options) : options_(options), map_(shippedMap(o
     VirtualCellOptions cell;
     cell.map = map_;
     cell.force_N = [force_N] { return force_N->load(); };
+    if (options.force) cell.force_N = options.force;
     cell.noise_N = options.noise_N;
     cell.capacity_N = options.capacity_N;
     cell.seed = options.seed + static_cast<std::uint64_t>(i);

@@ -30,6 +30,7 @@ struct BenchOptions {
   double noise_N = 0.003;
   double capacity_N = 50.0;
   std::uint64_t seed = 1;
+  std::function<double()> force = nullptr;  ///< [N], of all cells; without, what setForce() says.
 };
 
 /// Virtual cells with a force that tests set, on TCP (a server each) or on one RTU bus. The

@@ -272,6 +272,14 @@ bool VirtualCell::hasFault() const {
   return !state_->faults.empty();
 }
 
+void VirtualCell::chooseScale(unsigned choice) {
+  const std::lock_guard lock(mutex_);
+  const ScaleRule& scale = options_.map->scale;
+  require(scale.source && choice < scale.choices.size(), "the map has no such scale");
+  options_.scale_choice = choice;
+  state_->setBits(*scale.source, choice);
+}
+
 int VirtualCell::commands() const {
   const std::lock_guard lock(mutex_);
   return state_->commands;

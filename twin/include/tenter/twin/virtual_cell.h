@@ -87,6 +87,8 @@ class VirtualCell {
   /// For the wire that serves the cell: the fault that befalls this request.
   std::optional<VirtualCellFault> takeWireFault();
 
+  /// As somebody does at the amplifier's keys. Precondition: the map lets a register choose.
+  void chooseScale(unsigned choice);
   /// Commands carried out since the beginning.
   int commands() const;
 
