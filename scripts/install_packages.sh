@@ -14,7 +14,7 @@ packages=(
   libmodbus-dev
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-numpy python3-jsonschema
-  mbpoll python3-pymodbus python3-serial
+  mbpoll python3-pymodbus python3-serial-asyncio
 )
 
 if [[ "${1:-}" == --list ]]; then
