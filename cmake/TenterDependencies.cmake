@@ -24,8 +24,7 @@ target_link_libraries(tenter_cholmod INTERFACE ${CHOLMOD_LIBRARY})
 
 if(TENTER_HARDWARE)
   find_package(PkgConfig REQUIRED)
-  pkg_check_modules(MODBUS REQUIRED IMPORTED_TARGET GLOBAL libmodbus>=3.1.6)
-  add_library(tenter::modbus ALIAS PkgConfig::MODBUS)
+  pkg_check_modules(libmodbus REQUIRED IMPORTED_TARGET GLOBAL libmodbus>=3.1.6)
 endif()
 
 # tests only

@@ -13,7 +13,8 @@ constexpr double kTwinNearness = 0.2;  // of the last weight
 // Floats with exchanged words are mostly far too large or far too small. No amplifier resolves
 // this.
 constexpr double kSmallestWeight_N = 1e-6;
-constexpr int kProbationSamples = 3;
+// Up to a tenth of floats with exchanged words look like weights; ten in a row do not.
+constexpr int kProbationSamples = 10;
 constexpr int kFewestStuckSamples = 5;
 
 bool isNear(double a_N, double last_N) {
@@ -69,7 +70,14 @@ LoadCellFault LoadCellPlausibility::judgeValue(const DecodedWeights& weights) co
   return LoadCellFault::kNone;
 }
 
+bool LoadCellPlausibility::passesProbation(double gross_N) {
+  if (!candidate_N_ || !isNear(gross_N, *candidate_N_)) good_to_come_ = kProbationSamples;
+  candidate_N_ = gross_N;
+  return --good_to_come_ == 0;
+}
+
 LoadCellFault LoadCellPlausibility::judge(const DecodedWeights& weights, std::int64_t stamp_ns) {
+  const double gross_N = tension_N(weights.gross_N);
   const bool stuck = isStuck(weights, stamp_ns);
   LoadCellFault fault = weights.fault;
   if (fault == LoadCellFault::kNone || fault == LoadCellFault::kInconsistent) {
@@ -78,11 +86,9 @@ LoadCellFault LoadCellPlausibility::judge(const DecodedWeights& weights, std::in
   }
   if (fault == LoadCellFault::kNone && stuck) fault = LoadCellFault::kStuck;
   if (startsProbation(fault)) good_to_come_ = kProbationSamples;
-  if (fault == LoadCellFault::kNone && good_to_come_ > 0) {
-    --good_to_come_;
-    if (good_to_come_ > 0) return LoadCellFault::kProbation;
-  }
-  if (fault == LoadCellFault::kNone) last_N_ = tension_N(weights.gross_N);
+  if (fault != LoadCellFault::kNone) return fault;
+  if (good_to_come_ > 0 && !passesProbation(gross_N)) return LoadCellFault::kProbation;
+  last_N_ = gross_N;
   return fault;
 }
 

@@ -23,12 +23,14 @@ class LoadCellPlausibility {
  private:
   LoadCellFault judgeValue(const DecodedWeights& weights) const;
   bool isStuck(const DecodedWeights& weights, std::int64_t stamp_ns);
+  bool passesProbation(double gross_N);
   double tension_N(double weight_N) const { return reversed_ ? -weight_N : weight_N; }
 
   bool reversed_;
   double capacity_N_, lowest_N_;
   std::int64_t stuck_after_ns_;
-  std::optional<double> last_N_;
+  std::optional<double> last_N_;       // believed
+  std::optional<double> candidate_N_;  // of the probation
   std::uint64_t raw_ = 0;
   std::int64_t raw_since_ns_ = 0;
   int same_raw_ = 0;
