@@ -91,8 +91,8 @@ LoadCellScanner::LoadCellScanner(std::unique_ptr<Impl> impl) : impl_(std::move(i
 
 LoadCellScanner::~LoadCellScanner() = default;
 
-Result<std::unique_ptr<LoadCellScanner>> LoadCellScanner::start(std::vector<LoadCellConfig> cells,
-                                                                LoadCellScannerOptions options) {
+Result<std::unique_ptr<LoadCellScanner>> LoadCellScanner::start(
+    std::vector<LoadCellConfig> cells, const LoadCellScannerOptions& options) {
   if (const Result<void> good = checkTogether(cells); !good) return good.error();
   if (options.tcp_period < std::chrono::microseconds(500)) {
     return badInput("", "tcp_period", "must be at least 0.5 ms");

@@ -26,8 +26,10 @@ class Converter {
     if (const auto* table = node.as_table()) {
       Json object = Json::object();
       for (const auto& [key, value] : *table) {
-        const std::string name(key.str());
-        object[name] = convert(value, place.empty() ? name : place + "." + name);
+        std::string inner = place;
+        if (!inner.empty()) inner += '.';
+        inner += key.str();
+        object[std::string(key.str())] = convert(value, inner);
       }
       return object;
     }

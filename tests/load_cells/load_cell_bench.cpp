@@ -59,8 +59,8 @@ std::vector<LoadCellConfig> Bench::configs() const {
   return configs;
 }
 
-std::unique_ptr<LoadCellScanner> Bench::startScanner(LoadCellScannerOptions options) const {
-  return LoadCellScanner::start(configs(), std::move(options)).value();
+std::unique_ptr<LoadCellScanner> Bench::startScanner(const LoadCellScannerOptions& options) const {
+  return LoadCellScanner::start(configs(), options).value();
 }
 
 bool waitFor(const std::function<bool()>& condition, std::chrono::milliseconds limit) {

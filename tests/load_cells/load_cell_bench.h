@@ -46,7 +46,7 @@ class Bench {
   double force_N(int index) const { return *forces_N_[static_cast<std::size_t>(index)]; }
   VirtualModbus& server(int index) { return *servers_[servers_.size() == 1 ? 0 : index]; }
   std::vector<LoadCellConfig> configs() const;
-  std::unique_ptr<LoadCellScanner> startScanner(LoadCellScannerOptions options = {}) const;
+  std::unique_ptr<LoadCellScanner> startScanner(const LoadCellScannerOptions& options = {}) const;
 
  private:
   BenchOptions options_;

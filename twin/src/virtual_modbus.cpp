@@ -91,14 +91,14 @@ VirtualModbus::VirtualModbus(std::unique_ptr<Server> server) : server_(std::move
 VirtualModbus::~VirtualModbus() = default;
 
 Result<std::unique_ptr<VirtualModbus>> VirtualModbus::serveTcp(VirtualUnits units,
-                                                               VirtualTcpOptions options) {
+                                                               const VirtualTcpOptions& options) {
   auto server = TcpServer::make(std::move(units), options);
   if (!server) return server.error();
   return std::unique_ptr<VirtualModbus>(new VirtualModbus(std::move(*server)));
 }
 
 Result<std::unique_ptr<VirtualModbus>> VirtualModbus::serveRtu(VirtualUnits units,
-                                                               VirtualRtuOptions options) {
+                                                               const VirtualRtuOptions& options) {
   auto server = RtuServer::make(std::move(units), options);
   if (!server) return server.error();
   return std::unique_ptr<VirtualModbus>(new VirtualModbus(std::move(*server)));

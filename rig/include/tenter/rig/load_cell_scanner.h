@@ -44,7 +44,7 @@ class LoadCellScanner {
   /// Checks the configuration and starts the threads; whether the cells answer shows in their
   /// readings.
   static Result<std::unique_ptr<LoadCellScanner>> start(std::vector<LoadCellConfig> cells,
-                                                        LoadCellScannerOptions options = {});
+                                                        const LoadCellScannerOptions& options = {});
   ~LoadCellScanner();
   LoadCellScanner(const LoadCellScanner&) = delete;
   LoadCellScanner& operator=(const LoadCellScanner&) = delete;

@@ -41,9 +41,9 @@ struct VirtualModbusCounts {
 class VirtualModbus {
  public:
   static Result<std::unique_ptr<VirtualModbus>> serveTcp(VirtualUnits units,
-                                                         VirtualTcpOptions options = {});
+                                                         const VirtualTcpOptions& options = {});
   static Result<std::unique_ptr<VirtualModbus>> serveRtu(VirtualUnits units,
-                                                         VirtualRtuOptions options);
+                                                         const VirtualRtuOptions& options);
   ~VirtualModbus();
   VirtualModbus(const VirtualModbus&) = delete;
   VirtualModbus& operator=(const VirtualModbus&) = delete;
