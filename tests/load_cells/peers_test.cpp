@@ -3,11 +3,11 @@
 // pymodbus. mbpoll builds on libmodbus as the client does; pymodbus shares nothing with either.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
+#include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -53,6 +53,7 @@ class PeerServer {
       std::vector<std::string> words{kPython, script};
       words.insert(words.end(), arguments.begin(), arguments.end());
       std::vector<char*> pointers;
+      pointers.reserve(words.size() + 1);
       for (std::string& word : words) pointers.push_back(word.data());
       pointers.push_back(nullptr);
       execv(kPython, pointers.data());
