@@ -80,6 +80,7 @@ class ClothTest final : public SimulatedTest {
 
  protected:
   ClothState startState(const Simulation& simulation, int frame) const override;
+  bool startIsMeasured() const override { return true; }
   void weigh(const SolvedFrame& solved) override;
   void residualsOf(const SolvedFrame& solved, Eigen::VectorXd& residuals,
                    Eigen::MatrixXd* by_law_parameter) const override;

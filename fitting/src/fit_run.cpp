@@ -26,7 +26,7 @@ constexpr double kFinalTolerance = 1e-6;
 constexpr int kEarlyIterations = 10;
 /// Rounds over the blocks end when none lowers its cost by more than this share.
 constexpr double kSettledGain = 1e-4;
-constexpr int kMaxPasses = 4;
+constexpr int kMaxPasses = 6;
 /// A first guess may be far off; that is not noise.
 constexpr double kLargestMisfit = 100.0;
 /// Ranges narrower than this share of their place hold one knot only.
@@ -263,7 +263,17 @@ bool FitRun::refineBlock(const FitBlock& block, int pass) {
     if (evaluator_.cancelled()) return true;
     reweigh(block.tests);
   }
+  if (pass == 1) reconsiderShapes(block);
   return solve(block.groups, block.tests, 0, tight, "all frames");
+}
+
+/// The way from the first guess may have led a frame into another stable shape than the cloth's.
+void FitRun::reconsiderShapes(const FitBlock& block) {
+  const auto space = std::make_shared<FitSpace>(state_, block.groups);
+  evaluator_.configure(space, framesOf(block.tests, 0));
+  if (!evaluator_.evaluate(space->start(), false)) return;
+  evaluator_.accept();
+  evaluator_.adoptNearerShapes();
 }
 
 /// Block after block, until a round changes nothing any more: what one block gives, the next takes

@@ -65,6 +65,7 @@ class FitRun {
   const std::vector<double>* givenKnots(int group) const;
   bool refine();
   bool refineBlock(const FitBlock& block, int pass);
+  void reconsiderShapes(const FitBlock& block);
   void reweigh(const std::vector<int>& tests);
   void noteDropped(int dropped, const std::string& stage);
   std::vector<int> allTests() const;

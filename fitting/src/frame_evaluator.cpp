@@ -131,6 +131,16 @@ int FrameEvaluator::dropFailing(const Eigen::VectorXd& z) {
   return dropped;
 }
 
+int FrameEvaluator::adoptNearerShapes() {
+  std::atomic<int> adopted{0};
+  parallelFor(
+      static_cast<int>(frames_.size()), threads_,
+      [&](int i) { adopted += tests_[frames_[i].test]->adoptNearerShape(frames_[i].frame); },
+      [&] { return cancelled(); });
+  if (adopted > 0) valid_ = false;
+  return adopted;
+}
+
 double FrameEvaluator::cost() const {
   double sum = 0.0;
   for (const FrameBlock& block : blocks_) sum += block.residuals.squaredNorm();

@@ -51,6 +51,10 @@ class FrameEvaluator {
   /// many.
   int dropFailing(const Eigen::VectorXd& z);
 
+  /// Frames that lie nearer to the measurement in another stable shape change over to it. Returns
+  /// how many; the point must then be evaluated again.
+  int adoptNearerShapes();
+
   const std::vector<FrameBlock>& blocks() const { return blocks_; }
   double cost() const;  ///< Half the sum of squares at the point evaluated last.
   bool cancelled() const { return cancelled_ && cancelled_(); }

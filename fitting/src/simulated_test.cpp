@@ -10,6 +10,8 @@ namespace {
 
 /// Two equilibria of one frame are different shapes beyond this share of the sheet's diagonal.
 constexpr double kSameShape = 1e-3;
+/// Share of that below which shapes need not be told apart.
+constexpr double kNearEnough = 0.05;
 /// A warm start that takes longer than this is no better than a cold one.
 constexpr int kWarmIterations = 30;
 constexpr int kColdIterations = 300;
@@ -283,6 +285,29 @@ MultistabilityReport SimulatedTest::crossCheck(int frame) {
   report.energy_accepted_J = simulation.system.energy(current.state);
   report.energy_restarted_J = simulation.system.energy(again);
   return report;
+}
+
+bool SimulatedTest::adoptNearerShape(int index) {
+  if (!startIsMeasured()) return false;
+  Frame& frame = frames_[index];
+  const Result<SimulationPool::Lease> lease = replicaOf(index).pool->lease();
+  if (!lease || !isCurrent(frame.current) || !frame.current.outcome.stable) return false;
+  Simulation& simulation = **lease;
+  const int nodes = replicaOf(index).sheet.nodeCount();
+  const double same = kSameShape * diagonalOf(replicaOf(index).sheet);
+  const ClothState measured_shape = startState(simulation, index);
+  const auto distance = [&](const ClothState& a, const ClothState& b) {
+    return std::sqrt((a.positions(nodes) - b.positions(nodes)).squaredNorm() / nodes);
+  };
+  const double before = distance(frame.current.state, measured_shape);
+  if (before < kNearEnough * same) return false;
+  Solution again{generation_, {}, parameters_, {}, {}};
+  again.outcome = solveFrom(simulation, {measured_shape}, kRetryIterations, again.state);
+  if (!again.outcome.stable || distance(again.state, frame.current.state) < kNearEnough * same ||
+      distance(again.state, measured_shape) >= before)
+    return false;
+  frame.current = frame.accepted = std::move(again);
+  return true;
 }
 
 FramePrediction SimulatedTest::predict(int frame, bool with_derivatives) {

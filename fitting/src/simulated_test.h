@@ -41,6 +41,7 @@ class SimulatedTest : public FitTest {
   void restart() final;
   void reweigh() final;
   MultistabilityReport crossCheck(int frame) final;
+  bool adoptNearerShape(int frame) final;
   FramePrediction predict(int frame, bool with_derivatives) final;
   StrainSamples strainSamples(int component) const final;
 
@@ -57,6 +58,8 @@ class SimulatedTest : public FitTest {
 
   /// The shape from which a frame starts when nothing better is known.
   virtual ClothState startState(const Simulation& simulation, int frame) const = 0;
+  /// Whether startState() is what was measured, so that nearness to it tells shapes apart.
+  virtual bool startIsMeasured() const { return false; }
   /// Other starts to try, in order, when that one leads nowhere.
   virtual std::vector<ClothState> otherStarts(const Simulation&, int) const { return {}; }
   /// Called once per frame with the first solved state, and again after restart() and reweigh().

@@ -115,6 +115,10 @@ class FitTest {
   /// neither.
   virtual MultistabilityReport crossCheck(int frame);
 
+  /// Solves the frame again from the measured shape at the current parameters and takes that state,
+  /// if it is another stable shape and nearer to what was measured. Returns whether it did.
+  virtual bool adoptNearerShape(int /*frame*/) { return false; }
+
   virtual FramePrediction predict(int frame, bool with_derivatives) = 0;
 
   /// Strains of a component over all frames at the current states: value and weight (area), for
