@@ -27,6 +27,8 @@ constexpr int kEarlyIterations = 10;
 /// Rounds over the blocks end when none lowers its cost by more than this share.
 constexpr double kSettledGain = 1e-4;
 constexpr int kMaxPasses = 6;
+constexpr int kRefitRounds = 3;
+constexpr double kRefitGain = 0.2;
 /// A first guess may be far off; that is not noise.
 constexpr double kLargestMisfit = 100.0;
 /// Ranges narrower than this share of their place hold one knot only.
@@ -331,7 +333,11 @@ bool FitRun::refit(FitState start, const std::vector<int>& groups, int max_itera
   complete_ = false;
   const OuterOptions outer{
       .relative_tolerance = tolerance, .max_iterations = max_iterations, .progress = {}};
-  if (!solve(refined_, allTests(), kEarlyFrames, outer, "alternative law")) return false;
+  // Another law starts from a misfit that is not noise: the second round knows better what noise is.
+  for (int round = 0; round < kRefitRounds; ++round) {
+    if (!solve(refined_, allTests(), kEarlyFrames, outer, "alternative law")) return false;
+    if (last_.cost > (1.0 - kRefitGain) * last_.initial_cost) break;
+  }
   converged = last_.converged;
   return true;
 }

@@ -21,16 +21,19 @@ constexpr double kAboutAsGood = 1.5;
 constexpr int kIterations = 8;
 constexpr double kTolerance = 1e-3;
 
-/// Which couplings an alternative has, and which of them the fit may move.
+/// Couplings of an alternative. They are given, not fitted: three angles hardly tell a coupling from a curve of
+/// the shear, so a fit would leave it near where it began, and what matters is what such a law would say elsewhere.
 struct Alternative {
   const char* name;
   double poisson_ratio;
-  bool free_cross;
+  double stiffening;  ///< Shear stiffness at rest is doubled by a stretch of kStrain over this.
 };
+constexpr double kStrain = 0.05;
 constexpr Alternative kAlternatives[] = {
-    {"poisson", kPoissonRatio, false},
-    {"cross-stiffening", 0.0, true},
-    {"poisson and cross-stiffening", kPoissonRatio, true},
+    {"poisson", kPoissonRatio, 0.0},
+    {"cross-stiffening", 0.0, 1.0},
+    {"strong cross-stiffening", 0.0, 4.0},
+    {"cross-softening", 0.0, -1.0},
 };
 
 /// The model with the same strains and all of this one's components, and couplings besides.
@@ -69,24 +72,14 @@ void setCouplings(FitState& state, const Alternative& alternative) {
   const int poisson = state.groupOf(state.model->componentIndex("poisson"));
   const int cross = state.groupOf(state.model->componentIndex("cross_stiffening"));
   state.setConstant(poisson, alternative.poisson_ratio * stretch);
-  state.setConstant(cross, 0.0);
-  // Doubling the shear stiffness at a few per cent of stretch is the size of this coefficient.
-  constexpr double kStrain = 0.05;
-  state.groups[cross].reference =
-      std::max(stiffnessAtRest(state, "shear"), 1e-3 * stretch) / kStrain;
+  const double scale = std::max(stiffnessAtRest(state, "shear"), 1e-3 * stretch) / kStrain;
+  state.setConstant(cross, alternative.stiffening * scale);
 }
 
-std::vector<int> movingGroups(const FitState& state, const FitRun& run,
-                              const Alternative& alternative) {
+std::vector<int> movingGroups(const FitState& state, const FitRun& run) {
   std::vector<int> groups;
-  for (const int g : seenGroups(state, run.roles())) {
-    const ParameterGroup& group = state.groups[g];
-    if (group.bending || group.basis->size() == 0) continue;
-    if (group.may_be_negative &&
-        !(alternative.free_cross && state.groupName(g) == "cross_stiffening"))
-      continue;
-    groups.push_back(g);
-  }
+  for (const int g : seenGroups(state, run.roles()))
+    if (!state.groups[g].bending && !state.groups[g].may_be_negative) groups.push_back(g);
   return groups;
 }
 
@@ -142,7 +135,7 @@ nlohmann::json lawAlternatives(const FitRun& fitted, const std::vector<Measureme
     setCouplings(coupled, alternative);
     const bool usable =
         !run.evaluator().cancelled() &&
-        run.refit(coupled, movingGroups(coupled, run, alternative), kIterations, kTolerance);
+        run.refit(coupled, movingGroups(coupled, run), kIterations, kTolerance);
     if (!usable) continue;
     const double chi2 = 2.0 * run.last().cost;
     const nlohmann::json entry = alternativeJson(run, alternative, chi2, chosen, options);
