@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "smallest_eigenvalue.h"
 #include "sparse_cholesky.h"
@@ -16,10 +17,18 @@ constexpr double kForceToleranceOfNodeWeight = 1e-4;
 /// Forces are resolved to this many roundings of the positions, times the stiffest degree of
 /// freedom.
 constexpr double kRoundings = 8.0;
-/// Smallest shift of an indefinite Hessian, as a share of its stiffest entry; how it eases after a
-/// full step and stiffens after one that failed.
-constexpr double kLeastShift = 1e-9;
-constexpr double kEase = 0.15, kStiffen = 4.0;
+/// An indefinite Hessian is mixed with its element-wise projection. The share of the projection:
+/// first try, growth where that was not enough, ease after a step that went as foreseen, growth
+/// after one that did not, and below which the exact Hessian is tried again.
+constexpr double kFirstShare = 0.4, kShareGrowth = 10.0, kEase = 0.2, kStiffen = 2.0;
+constexpr double kLeastShare = 0.02;
+/// Smallest shift of a singular or indefinite matrix, as a share of its stiffest entry.
+constexpr double kLeastShift = 1e-9, kShiftGrowth = 4.0;
+/// The energy's change over the one foreseen: below the first a step was in vain, below the second
+/// half of it may be better, above the third it went as foreseen, above the last twice of it may be
+/// better.
+constexpr double kInVain = 0.1, kTooLong = 0.25, kAsForeseen = 0.5, kTooShort = 1.2;
+constexpr double kLongestReach = 0.04;  ///< Of steps that are made longer, in the sheet's size.
 constexpr double kArmijo = 1e-4;
 constexpr int kMaxBacktracks = 40;
 constexpr int kMaxSaddles = 20;
@@ -31,22 +40,36 @@ constexpr int kWatchdog = 4;
 
 using Clock = std::chrono::steady_clock;
 
+double stiffestEntry(const SparseLower& h) {
+  double stiffest = 0.0;
+  for (int c = 0; c < h.size; ++c) stiffest = std::max(stiffest, h.value[h.column_begin[c]]);
+  return stiffest;
+}
+
+double sizeOf(const ClothState& state) { return std::max(state.q.cwiseAbs().maxCoeff(), 1e-3); }
+
 }  // namespace
 
 struct EquilibriumSolver::Impl {
   explicit Impl(const ClothSystem& s)
-      : system(s), cholesky(s.hessian(s.restState(), Projection::kNone)), mass(s.dofMass()) {
+      : system(s),
+        mixed(s.hessian(s.restState(), Projection::kNone)),
+        cholesky(mixed),
+        mass(s.dofMass()) {
     g.resize(s.dofCount());
     trial_g.resize(s.dofCount());
     step.resize(s.dofCount());
   }
 
   const ClothSystem& system;
+  SparseLower mixed;  ///< The exact Hessian and `share` of its projection.
+  std::vector<double> exact;
   SparseCholesky cholesky;
   Eigen::VectorXd mass;
-  double shift = 0.0;  ///< Of the last indefinite Hessian [N/m].
+  double share = 0.0;       ///< Of the projection, to begin with.
+  double used_share = 0.0;  ///< Of the projection in the factors at hand.
   Eigen::VectorXd g, trial_g, step;
-  ClothState trial, escaped;
+  ClothState trial, other;
   /// Last state from which the energy has to fall, and the Newton step there (watchdog).
   struct Reference {
     ClothState state;
@@ -57,56 +80,101 @@ struct EquilibriumSolver::Impl {
 
   double roundingOfForces(const ClothState& state) const;
   double residual(const Eigen::VectorXd& gradient) const { return gradient.cwiseAbs().maxCoeff(); }
-  bool newtonDirection(const ClothState& state, EquilibriumSummary& summary);
+  bool newtonDirection(const ClothState& state, EquilibriumSummary& summary, bool from_exact);
+  bool factorizeMixed(const ClothState& state, EquilibriumSummary& summary);
+  bool factorizeShifted(const ClothState& state, EquilibriumSummary& summary);
   double fullStep(const ClothState& state) const;
+  double energyAt(const ClothState& state, double alpha, ClothState& place) const;
+  void rescale(const ClothState& state, double factor, double& alpha, double& e);
   bool lineSearch(ClothState& state, double& energy);
   bool tryFullStep(ClothState& state, double& energy);
   const Eigen::VectorXd& softestDirection();
-  bool leaveSaddle(ClothState& state, double& energy);
+  bool leaveSaddle(ClothState& state, double& energy, EquilibriumSummary& summary);
   void measureStability(const ClothState& state, EquilibriumSummary& summary);
   Termination iterate(ClothState& state, const EquilibriumOptions& options,
                       EquilibriumSummary& summary, Clock::time_point start);
 };
 
-/// step = -(H + shift I)^-1 g with the exact Hessian H: no shift if H is positive definite,
-/// otherwise the smallest that makes it so, searched for from where the last one was. All
-/// coordinates are lengths, so one shift [N/m] serves all; being of the size of the softest
-/// negative stiffness, it leaves the stiff directions alone. Returns whether H itself served.
-bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state,
-                                              EquilibriumSummary& summary) {
-  const SparseLower& h = system.hessian(state, Projection::kNone);
-  ++summary.factorizations;
-  const bool exact = cholesky.factorize(h);
-  if (!exact) {
-    double stiffest = 0.0;
-    for (int c = 0; c < h.size; ++c) stiffest = std::max(stiffest, h.value[h.column_begin[c]]);
-    const double least = kLeastShift * stiffest;
-    for (shift = std::max(shift, least);; shift *= kStiffen) {
-      ++summary.factorizations;
-      if (cholesky.factorize(h, shift)) break;
-      if (shift > stiffest || !std::isfinite(stiffest)) {
-        step = -g / std::max(stiffest, std::numeric_limits<double>::min());
-        return false;
-      }
-    }
+/// step = -M^-1 g. M is the exact Hessian H if that is positive definite, otherwise H + s (P - H)
+/// with P its element-wise projection and s as small as serves, searched for from where the last
+/// one was; `from_exact` searches from H. What makes a buckling sheet indefinite is compression,
+/// which a few elements may carry a thousand times more of than the rest: this takes from each in
+/// proportion, where a multiple of the identity would hold back the whole sheet for the worst of
+/// them. Returns whether H itself served.
+bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state, EquilibriumSummary& summary,
+                                              bool from_exact) {
+  used_share = 0.0;
+  bool served = false;
+  if (share < kLeastShare || from_exact) {
+    ++summary.factorizations;
+    served = cholesky.factorize(system.hessian(state, Projection::kNone));
+    share = served ? 0.0 : std::max(share, kFirstShare);
+  }
+  if (!served && !factorizeMixed(state, summary)) {
+    step = -g / std::max(stiffestEntry(mixed), std::numeric_limits<double>::min());
+    return false;
   }
   cholesky.solve(g, step);
   step = -step;
-  return exact;
+  return served;
+}
+
+bool EquilibriumSolver::Impl::factorizeMixed(const ClothState& state, EquilibriumSummary& summary) {
+  exact = system.hessian(state, Projection::kNone).value;
+  const SparseLower& projected = system.hessian(state, Projection::kPositiveSemiDefinite);
+  for (;; share = std::min(1.0, kShareGrowth * share)) {
+    for (std::size_t i = 0; i < exact.size(); ++i)
+      mixed.value[i] = exact[i] + share * (projected.value[i] - exact[i]);
+    ++summary.factorizations;
+    used_share = share;
+    if (cholesky.factorize(mixed, share < 1.0 ? 0.0 : kLeastShift * stiffestEntry(mixed)))
+      return true;
+    if (share >= 1.0) return false;
+  }
+}
+
+/// Factorises H + shift I with the smallest shift that serves: the softest direction is then that
+/// of H.
+bool EquilibriumSolver::Impl::factorizeShifted(const ClothState& state,
+                                               EquilibriumSummary& summary) {
+  const SparseLower& h = system.hessian(state, Projection::kNone);
+  const double stiffest = stiffestEntry(h);
+  for (double shift = kLeastShift * stiffest; shift < stiffest; shift *= kShiftGrowth) {
+    ++summary.factorizations;
+    if (cholesky.factorize(h, shift)) return true;
+  }
+  return false;
 }
 
 double EquilibriumSolver::Impl::roundingOfForces(const ClothState& state) const {
-  const SparseLower& h = system.hessian(state, Projection::kNone);
-  double stiffest = 0.0;
-  for (int c = 0; c < h.size; ++c) stiffest = std::max(stiffest, h.value[h.column_begin[c]]);
-  return kRoundings * std::numeric_limits<double>::epsilon() * stiffest *
-         state.q.cwiseAbs().maxCoeff();
+  return kRoundings * std::numeric_limits<double>::epsilon() *
+         stiffestEntry(system.hessian(state, Projection::kNone)) * state.q.cwiseAbs().maxCoeff();
 }
 
 /// A step longer than a third of the sheet is never meant.
 double EquilibriumSolver::Impl::fullStep(const ClothState& state) const {
-  const double size = std::max(state.q.cwiseAbs().maxCoeff(), 1e-3);
-  return std::min(1.0, size / 3.0 / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
+  return std::min(1.0, sizeOf(state) / 3.0 / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
+}
+
+/// Energy at state + alpha step; `place` is left there.
+double EquilibriumSolver::Impl::energyAt(const ClothState& state, double alpha,
+                                         ClothState& place) const {
+  place = state;
+  system.advance(place, step, alpha);
+  return system.energy(place);
+}
+
+/// Multiplies alpha by `factor` as long as that lowers the energy `e` at `trial`.
+void EquilibriumSolver::Impl::rescale(const ClothState& state, double factor, double& alpha,
+                                      double& e) {
+  const double longest = kLongestReach * sizeOf(state) / step.cwiseAbs().maxCoeff();
+  while (factor < 1.0 || factor * alpha < longest) {
+    const double next = energyAt(state, factor * alpha, other);
+    if (!(next < e)) return;
+    std::swap(trial, other);
+    e = next;
+    alpha *= factor;
+  }
 }
 
 /// Takes a Newton step although the energy may rise: bending an almost inextensible sheet along a
@@ -117,10 +185,8 @@ bool EquilibriumSolver::Impl::tryFullStep(ClothState& state, double& energy) {
   if (reference.steps_since == 0 || energy <= reference.energy) {
     reference = {state, energy, g, step, 0};
   }
-  trial = state;
   const double alpha = fullStep(state);
-  system.advance(trial, step, alpha);
-  const double e = system.energy(trial);
+  const double e = energyAt(state, alpha, trial);
   const bool falls = e <= energy + kArmijo * alpha * slope;
   if (std::isfinite(e) && (falls || reference.steps_since < kWatchdog)) {
     std::swap(state, trial);
@@ -138,26 +204,33 @@ bool EquilibriumSolver::Impl::tryFullStep(ClothState& state, double& energy) {
 }
 
 /// Backtracks until the energy falls enough or, where rounding hides the energy's change, until the
-/// residual falls.
+/// residual falls. Half the step is taken where friction's corners make Newton's method jump to and
+/// fro, a multiple of it where curvature is negative.
 bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
   const double slope = g.dot(step);
   double alpha = fullStep(state);
   const double rounding = 1e-13 * std::max(std::abs(energy), std::abs(slope));
   const double before = residual(g);
+  const auto agreement = [&](double e) {
+    return (e - energy) / (alpha * slope * (1.0 - 0.5 * alpha));
+  };
   for (int k = 0; k < kMaxBacktracks; ++k, alpha *= 0.5) {
-    trial = state;
-    system.advance(trial, step, alpha);
-    const double e = system.energy(trial);
+    double e = energyAt(state, alpha, trial);
     if (!std::isfinite(e)) continue;
     const double wanted = kArmijo * alpha * slope;
     const bool visible = std::abs(wanted) > rounding;
     if (visible && e > energy + wanted) continue;
+    if (visible && agreement(e) < kTooLong) rescale(state, 0.5, alpha, e);
+    const double agreed = agreement(e);
+    if (k == 0 && used_share > 0.0 && e < energy - rounding && agreed > kTooShort)
+      rescale(state, 2.0, alpha, e);
     system.gradient(trial, trial_g);
     if (!visible && !(residual(trial_g) < before) && !(e < energy + wanted)) continue;
     std::swap(state, trial);
     std::swap(g, trial_g);
     energy = e;
-    shift *= k == 0 ? kEase : kStiffen;
+    if (k == 0 && agreed > kAsForeseen) share *= kEase;
+    if (k > 0 || agreed < kInVain) share = std::min(1.0, kStiffen * share);
     return true;
   }
   return false;
@@ -175,28 +248,26 @@ const Eigen::VectorXd& EquilibriumSolver::Impl::softestDirection() {
   return step;
 }
 
-/// Moves along the softest direction to lower energy. `step` and the factors are those of the
-/// shifted Hessian there.
-bool EquilibriumSolver::Impl::leaveSaddle(ClothState& state, double& energy) {
+/// Moves along the softest direction to lower energy.
+bool EquilibriumSolver::Impl::leaveSaddle(ClothState& state, double& energy,
+                                          EquilibriumSummary& summary) {
+  if (!factorizeShifted(state, summary)) return false;
   const Eigen::VectorXd& v = softestDirection();
-  const double size = std::max(state.q.cwiseAbs().maxCoeff(), 1e-3);
-  const double unit = size / v.cwiseAbs().maxCoeff();
+  const double unit = sizeOf(state) / v.cwiseAbs().maxCoeff();
   double best = energy;
   for (double length = kFirstEscape; length < kLastEscape; length *= 3.0) {
     bool better = false;
     for (const double sign : {1.0, -1.0}) {
-      trial = state;
-      system.advance(trial, v, sign * length * unit);
-      const double e = system.energy(trial);
+      const double e = energyAt(state, sign * length * unit, trial);
       if (!std::isfinite(e) || !(e < best)) continue;
       best = e;
-      std::swap(escaped, trial);
+      std::swap(other, trial);
       better = true;
     }
     if (!better && best < energy) break;
   }
   if (!(best < energy)) return false;
-  std::swap(state, escaped);
+  std::swap(state, other);
   energy = best;
   system.gradient(state, g);
   reference.steps_since = 0;
@@ -211,6 +282,7 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
   double energy = system.energy(state);
   system.gradient(state, g);
   reference.steps_since = 0;  // whatever an earlier solve left there is of another state
+  share = 0.0;
   int saddles = 0;
   for (int k = 0;; ++k) {
     summary.residual_N = residual(g);
@@ -227,22 +299,34 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
       return Termination::kTimeBudget;
     }
     if (small) {
-      summary.stable = newtonDirection(state, summary);
-      if (summary.stable || ++saddles > kMaxSaddles || !leaveSaddle(state, energy))
+      summary.stable = newtonDirection(state, summary, true);
+      if (summary.stable || ++saddles > kMaxSaddles || !leaveSaddle(state, energy, summary))
         return Termination::kConverged;
       continue;
     }
-    const bool exact = newtonDirection(state, summary);
+    bool served = newtonDirection(state, summary, false);
     ++summary.newton_steps;
-    if (exact && tryFullStep(state, energy)) continue;
+    if (!served && step.cwiseAbs().maxCoeff() < kFirstEscape * sizeOf(state)) {
+      // So short a step from a ridge leads along it, not off.
+      served = newtonDirection(state, summary, true);
+      if (!served && saddles++ < kMaxSaddles) {
+        if (leaveSaddle(state, energy, summary)) continue;
+        newtonDirection(state, summary, false);
+      }
+    }
+    if (served && tryFullStep(state, energy)) continue;
     if (lineSearch(state, energy)) continue;
+    if (!served && share < 1.0) {
+      share = 1.0;
+      continue;
+    }
     // At the limit of rounding no step can show progress: that is convergence if forces are at that
     // limit too.
-    if (exact && summary.residual_N <= std::max(tolerance, roundingOfForces(state))) {
+    if (served && summary.residual_N <= std::max(tolerance, roundingOfForces(state))) {
       summary.stable = true;
       return Termination::kConverged;
     }
-    if (saddles++ < kMaxSaddles && !exact && leaveSaddle(state, energy)) continue;
+    if (saddles++ < kMaxSaddles && !served && leaveSaddle(state, energy, summary)) continue;
     return Termination::kLineSearchFailed;
   }
 }

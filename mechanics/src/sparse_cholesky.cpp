@@ -5,7 +5,9 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <stdexcept>
+#include <string_view>
 
 namespace tenter {
 namespace {
@@ -14,6 +16,34 @@ void callIfLoaded(const char* name, int argument) {
   if (void* function = dlsym(RTLD_DEFAULT, name))
     reinterpret_cast<void (*)(int)>(function)(argument);
 }
+
+/// A release of OpenBLAS takes a processor younger than itself for one of 2004 and computes at a
+/// third of its speed. Has it choose again, with Haswell's kernels, where AVX2 is there; what the
+/// user chose in OPENBLAS_CORETYPE stays. No BLAS call may be under way.
+bool chooseKernels() {
+#ifdef __x86_64__
+  __builtin_cpu_init();
+  constexpr const char* kChoice = "OPENBLAS_CORETYPE";
+  const bool able = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  if (!able || std::getenv(kChoice) != nullptr) return false;
+  const auto name =
+      reinterpret_cast<const char* (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_corename"));
+  const auto quit = reinterpret_cast<void (*)()>(dlsym(RTLD_DEFAULT, "gotoblas_dynamic_quit"));
+  const auto init = reinterpret_cast<void (*)()>(dlsym(RTLD_DEFAULT, "gotoblas_dynamic_init"));
+  if (name == nullptr || quit == nullptr || init == nullptr) return false;
+  if (std::string_view(name()) != "Prescott") return false;
+  setenv(kChoice, "Haswell", 1);
+  quit();
+  init();
+  unsetenv(kChoice);
+  return true;
+#else
+  return false;
+#endif
+}
+
+/// Before main, while there is but one thread.
+[[maybe_unused]] const bool kKernelsChosen = chooseKernels();
 
 /// Supernodes here are so small that a second thread inside BLAS (OpenBLAS) or CHOLMOD (OpenMP)
 /// costs many times what it saves. Which BLAS is loaded is known only when the program runs.

@@ -6,7 +6,6 @@
 #include "random_numbers.h"
 #include "rig_setup.h"
 #include "sheet_sampler.h"
-#include "stable_shape.h"
 #include "virtual_cloth.h"
 
 namespace tenter {
@@ -141,7 +140,7 @@ class CordRun {
     return sum / cords;
   }
 
-  bool solve() { return solver_->solve(state_, run_.statistics); }
+  bool solve() { return findStableShape(*solver_, state_, run_.statistics); }
 
   /// Moves one channel's actuators to `travel_m`, in smaller steps where one step fails.
   bool moveTo(int channel, double travel_m) {
@@ -247,7 +246,7 @@ class CordRun {
   std::optional<SheetSampler> sampler_;
   std::shared_ptr<FrictionalLaw> friction_;
   std::optional<ClothSystem> system_;
-  std::optional<StableShapeSolver> solver_;
+  std::optional<EquilibriumSolver> solver_;
   ClothState state_;
   std::vector<std::vector<int>> clamped_;
   std::vector<double> lengths_;

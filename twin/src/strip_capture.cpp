@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "random_numbers.h"
-#include "stable_shape.h"
 #include "tenter/twin/capture.h"
 #include "virtual_cloth.h"
 
@@ -103,8 +102,8 @@ class PulledStrip {
     pose.translation().x() = travel_m;
     system_->setClipPose(state, 1, pose);
     CaptureStatistics unused;
-    StableShapeSolver solver(*system_);
-    if (!solver.solve(state, unused)) {
+    EquilibriumSolver solver(*system_);
+    if (!findStableShape(solver, state, unused)) {
       return notConverged("the virtual strip found no equilibrium at a travel of " +
                           std::to_string(travel_m) + " m");
     }
@@ -210,8 +209,8 @@ Result<Measurement> captureCantilever(const CantileverOptions& o) {
   }
   system->setClipPose(state, 0, Eigen::Isometry3d::Identity());
   CaptureStatistics unused;
-  StableShapeSolver solver(*system);
-  if (!solver.solve(state, unused))
+  EquilibriumSolver solver(*system);
+  if (!findStableShape(solver, state, unused))
     return notConverged("the virtual cantilever found no stable equilibrium");
 
   Measurement m = stripMeasurement(*specimen, "cantilever", o.angle_rad);

@@ -5,7 +5,6 @@
 
 #include "rig_setup.h"
 #include "sheet_sampler.h"
-#include "stable_shape.h"
 #include "virtual_cloth.h"
 
 namespace tenter {
@@ -98,8 +97,8 @@ class TableRun {
     start(*system, lines, edge, state);
     system->setClipPose(state, 0, pose);
 
-    StableShapeSolver solver(*system);
-    if (!solver.solve(state, run_.statistics)) return false;
+    EquilibriumSolver solver(*system);
+    if (!findStableShape(solver, state, run_.statistics)) return false;
     remember(state.positions(system->sheet().nodeCount()), lines, edge);
     if (recorded) record(state.positions(system->sheet().nodeCount()), lines, edge, pose, frame);
     return true;

@@ -80,9 +80,21 @@ TriangleMesh trackedMesh(int per_side, bool on_bias) {
       .rest;
 }
 
-void count(const EquilibriumSummary& summary, CaptureStatistics& statistics) {
+bool findStableShape(EquilibriumSolver& solver, ClothState& state, CaptureStatistics& statistics) {
+  constexpr int kMaxNewtonSteps = 300;  // a snap takes up to 100, most frames 4 to 15
+  const ClothState before = state;
+  EquilibriumOptions options;
+  options.max_iterations = kMaxNewtonSteps;
+  const EquilibriumSummary summary = solver.solve(state, options);
   statistics.newton_steps += summary.newton_steps;
   statistics.factorizations += summary.factorizations;
+  const bool good = summary.converged() && summary.stable;
+  if (good) {
+    statistics.largest_residual_N = std::max(statistics.largest_residual_N, summary.residual_N);
+  } else {
+    state = before;
+  }
+  return good;
 }
 
 }  // namespace tenter

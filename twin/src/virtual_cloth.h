@@ -55,7 +55,8 @@ Result<CaptureRun> runCords(const CaptureOptions& options, const Fabric& specime
 Result<CaptureRun> runTable(const CaptureOptions& options, const Fabric& specimen,
                             const ClothSource& cloth);
 
-/// Adds the cost of a solve to the statistics.
-void count(const EquilibriumSummary& summary, CaptureStatistics& statistics);
+/// Solves and counts the cost. True if `state` is now a converged, stable equilibrium; otherwise it
+/// is as it was.
+bool findStableShape(EquilibriumSolver& solver, ClothState& state, CaptureStatistics& statistics);
 
 }  // namespace tenter

@@ -45,9 +45,9 @@ struct EquilibriumSummary {
   bool converged() const { return termination == Termination::kConverged; }
 };
 
-/// Newton's method on the energy with the exact Hessian; element-wise projection only when it is
-/// indefinite; sparse Cholesky analysed once per solver and reused. After a failed solve the state
-/// is the best so far, and the summary says why it failed.
+/// Newton's method on the energy with the exact Hessian, mixed with as little as serves of its
+/// element-wise projection where it is indefinite; sparse Cholesky analysed once per solver and
+/// reused. After a failed solve the state is the best so far, and the summary says why it failed.
 class EquilibriumSolver {
  public:
   explicit EquilibriumSolver(const ClothSystem& system);
