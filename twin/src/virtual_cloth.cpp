@@ -81,7 +81,7 @@ TriangleMesh trackedMesh(int per_side, bool on_bias) {
 }
 
 bool findStableShape(EquilibriumSolver& solver, ClothState& state, CaptureStatistics& statistics) {
-  constexpr int kMaxNewtonSteps = 300;  // a snap takes up to 100, most frames 4 to 15
+  constexpr int kMaxNewtonSteps = 300;  // frames take 5 to 18 on the average, snaps many times that
   const ClothState before = state;
   EquilibriumOptions options;
   options.max_iterations = kMaxNewtonSteps;
