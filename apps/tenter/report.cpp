@@ -114,6 +114,7 @@ Plot testPlot(const EvaluatedTest& test, bool held_out) {
     measured.x.push_back(frame.displacement);
     measured.y.push_back(frame.summary_measured);
     model.y.push_back(frame.summary_predicted);
+    if (i < test.band_total.size()) model.half_width.push_back(test.band_total[i]);
   }
   model.points = true;
   for (const PlotSeries& s : {loading, unloading, model}) {

@@ -112,6 +112,12 @@ std::string drawSeries(const PlotSeries& s, const Canvas& canvas) {
   if (s.points) {
     for (std::size_t i = 0; i < s.x.size(); ++i) {
       if (!drawable(s, i)) continue;
+      if (const double band = bandAt(s, i); band > 0.0) {
+        svg +=
+            format("<line x1=\"%.1f\" y1=\"%.1f\" ", canvas.px(s.x[i]), canvas.py(s.y[i] - band)) +
+            format("x2=\"%.1f\" y2=\"%.1f\" ", canvas.px(s.x[i]), canvas.py(s.y[i] + band)) +
+            "stroke=\"" + s.colour + "\" opacity=\"0.35\"/>";
+      }
       svg +=
           format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"2\" ", canvas.px(s.x[i]), canvas.py(s.y[i])) +
           "fill=\"" + s.colour + "\"/>";
@@ -156,8 +162,10 @@ std::string renderSvg(const Plot& plot) {
   double row = kTop + 12;
   for (const PlotSeries& s : plot.series) {
     if (s.label.empty()) continue;
-    svg += format("<text x=\"%.1f\" y=\"%.1f\" ", kLeft + 8, row) + "fill=\"" + s.colour +
-           "\" class=\"key\">" + escapeHtml(s.label) + "</text>";
+    svg += format("<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3\" ", kLeft + 8, row - 4) + "fill=\"" +
+           s.colour + "\"/>";
+    svg += format("<text x=\"%.1f\" y=\"%.1f\" class=\"key\">", kLeft + 15, row) +
+           escapeHtml(s.label) + "</text>";
     row += 13;
   }
   return svg + "</svg>";

@@ -6,7 +6,8 @@
 
 namespace tenter::app {
 
-/// One line, or one cloud of points, of a plot; with `half_width` a line has a band.
+/// One line, or one cloud of points, of a plot; with `half_width` a line has a band and points have
+/// bars.
 struct PlotSeries {
   std::string label;
   std::string colour = "#1f5fa8";

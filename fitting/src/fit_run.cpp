@@ -333,7 +333,8 @@ bool FitRun::refit(FitState start, const std::vector<int>& groups, int max_itera
   complete_ = false;
   const OuterOptions outer{
       .relative_tolerance = tolerance, .max_iterations = max_iterations, .progress = {}};
-  // Another law starts from a misfit that is not noise: the second round knows better what noise is.
+  // Another law starts from a misfit that is not noise: the second round knows better what noise
+  // is.
   for (int round = 0; round < kRefitRounds; ++round) {
     if (!solve(refined_, allTests(), kEarlyFrames, outer, "alternative law")) return false;
     if (last_.cost > (1.0 - kRefitGain) * last_.initial_cost) break;

@@ -21,8 +21,9 @@ constexpr double kAboutAsGood = 1.5;
 constexpr int kIterations = 8;
 constexpr double kTolerance = 1e-3;
 
-/// Couplings of an alternative. They are given, not fitted: three angles hardly tell a coupling from a curve of
-/// the shear, so a fit would leave it near where it began, and what matters is what such a law would say elsewhere.
+/// Couplings of an alternative. They are given, not fitted: three angles hardly tell a coupling
+/// from a curve of the shear, so a fit would leave it near where it began, and what matters is what
+/// such a law would say elsewhere.
 struct Alternative {
   const char* name;
   double poisson_ratio;
@@ -133,9 +134,8 @@ nlohmann::json lawAlternatives(const FitRun& fitted, const std::vector<Measureme
   for (const Alternative& alternative : kAlternatives) {
     FitState coupled = start;
     setCouplings(coupled, alternative);
-    const bool usable =
-        !run.evaluator().cancelled() &&
-        run.refit(coupled, movingGroups(coupled, run), kIterations, kTolerance);
+    const bool usable = !run.evaluator().cancelled() &&
+                        run.refit(coupled, movingGroups(coupled, run), kIterations, kTolerance);
     if (!usable) continue;
     const double chi2 = 2.0 * run.last().cost;
     const nlohmann::json entry = alternativeJson(run, alternative, chi2, chosen, options);
