@@ -73,6 +73,15 @@ Eigen::MatrixXd inverseOfFree(Eigen::MatrixXd equations, const std::vector<bool>
   return inverse;
 }
 
+/// inverse * noise * inverse^T through a root of the noise: rounding then cannot make a variance
+/// negative, however unevenly the entries are known.
+Eigen::MatrixXd covarianceOf(const Eigen::MatrixXd& inverse, const Eigen::MatrixXd& noise) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (noise + noise.transpose()));
+  const Eigen::MatrixXd root =
+      inverse * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return root * root.transpose();
+}
+
 }  // namespace
 
 FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<FitBlock>& blocks,
@@ -90,8 +99,7 @@ FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<F
     test.chi2_per_dof = test.chi2 / std::max(1.0, test.residuals - taken);
     noise += std::max(1.0, test.chi2_per_dof) * test.equations() * test.own.asDiagonal();
   }
-  const Eigen::MatrixXd covariance = inverse * noise * inverse.transpose();
-  statistics.covariance = 0.5 * (covariance + covariance.transpose());
+  statistics.covariance = covarianceOf(inverse, noise);
   return statistics;
 }
 
@@ -180,8 +188,7 @@ std::vector<Specimen> specimenSteps(const FrameEvaluator& evaluator,
       gradient += weight * test.own.cwiseProduct(test.gradient);
     }
     const Eigen::MatrixXd inverse = inverseOfFree(equations, statistics.at_bound);
-    Specimen specimen{name, (z - inverse * gradient).cwiseMax(lower),
-                      inverse * noise * inverse.transpose()};
+    Specimen specimen{name, (z - inverse * gradient).cwiseMax(lower), covarianceOf(inverse, noise)};
     specimens.push_back(std::move(specimen));
   }
   return specimens;

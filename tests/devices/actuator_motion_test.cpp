@@ -59,7 +59,8 @@ TEST(ActuatorMotion, TargetIsReachedAndNothingMovesBeforeSafeStartIsLeft) {
   ASSERT_TRUE(rig.bank.axis(0).setTarget(0.0008, kPatience).ok());
   EXPECT_TRUE(keepAliveUntil(rig, 2.0, [&] {
     const AxisReading reading = rig.bank.axis(0).status(kPatience);
-    return reading.status && std::abs(reading.status->position_m - 0.0008) < kOneMicrostep_m;
+    return reading.status && reading.status->velocity_m_per_s == 0.0 &&
+           std::abs(reading.status->position_m - 0.0008) < kOneMicrostep_m;
   }));
   EXPECT_NEAR(rig.usb->state(0).position_units, 1800.0, 1.0);
   EXPECT_EQ(*rig.bank.axis(0).status(kPatience).status->velocity_m_per_s, 0.0);
