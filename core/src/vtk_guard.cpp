@@ -171,6 +171,7 @@ Result<void> checkArrays(std::string_view content, const std::string& file) {
     for (auto at = content.find(element); at != std::string_view::npos;
          at = content.find(element, at + 1)) {
       const std::string_view tag = tagAt(content, at);
+      if (at + tag.size() == content.size()) break;  // cut off, as VTK will say
       const std::string place =
           "array \"" + std::string(attribute(tag, "Name").substr(0, 60)) + "\"";
       if (std::count(tag.begin(), tag.end(), '"') % 2 != 0 ||
