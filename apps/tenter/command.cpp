@@ -10,11 +10,15 @@ void Console::say(const std::string& line) const {
 }
 
 void Console::warn(const std::string& line) const {
-  if (!quiet) std::fprintf(stderr, "tenter: %s\n", line.c_str());
+  if (!quiet) complain(line);
+}
+
+void Console::complain(const std::string& line) {
+  std::fprintf(stderr, "tenter: %s\n", line.c_str());
 }
 
 void Console::fail(const Error& error) {
-  std::fprintf(stderr, "tenter: %s\n", error.message().c_str());
+  complain(error.message());
   answer["error"] = {{"exit_code", static_cast<int>(error.kind)},
                      {"file", error.file},
                      {"place", error.place},
@@ -27,6 +31,10 @@ void Console::printAnswer() const {
   // File names need not be UTF-8.
   const auto replace = nlohmann::json::error_handler_t::replace;
   std::fprintf(stdout, "%s\n", answer.dump(2, ' ', false, replace).c_str());
+}
+
+std::string counted(std::size_t count, const std::string& thing) {
+  return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
 }
 
 void addSubcommands(CLI::App& command, std::span<const Verb> rows, Action& action) {

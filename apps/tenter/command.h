@@ -27,10 +27,15 @@ class Console {
   void say(const std::string& line) const;
   /// One line on stderr, unless --quiet.
   void warn(const std::string& line) const;
+  /// One line on stderr, --quiet or not: why the exit code is not 0.
+  static void complain(const std::string& line);
   /// An error on stderr, and in the answer with --json.
   void fail(const Error& error);
   void printAnswer() const;
 };
+
+/// "1 frame", "2 frames".
+std::string counted(std::size_t count, const std::string& thing);
 
 /// What a verb does once its options are read: an exit code, or the error that has one.
 using Action = std::function<Result<int>(Console&)>;

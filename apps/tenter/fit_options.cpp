@@ -64,7 +64,7 @@ std::string residualLine(const TestResidual& r) {
     std::snprintf(text, sizeof text, " position %.3g mm,", 1e3 * r.position_rms_m);
     line += text;
   }
-  line += " " + std::to_string(r.frames) + " frames";
+  line += " " + counted(static_cast<std::size_t>(r.frames), "frame");
   if (r.unconverged_frames > 0) {
     line += ", " + std::to_string(r.unconverged_frames) + " did not converge";
   }

@@ -27,7 +27,7 @@ Result<int> run(const Options& o, Console& console) {
                     {"law", imported->material.law},
                     {"fabric", imported->material.fabric},
                     {"flagged", flaggedToJson(imported->flagged)}};
-  console.say(o.output + ": " + std::to_string(imported->flagged.size()) + " rows flagged");
+  console.say(o.output + ": " + counted(imported->flagged.size(), "row") + " flagged");
   return kDone;
 }
 

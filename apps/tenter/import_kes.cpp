@@ -66,8 +66,8 @@ Result<int> run(const Options& o, Console& console) {
   }
   warnFlagged(flagged, console);
   console.answer = {{"output", o.output}, {"fabrics", names}, {"flagged", flaggedToJson(flagged)}};
-  console.say(o.output + ": " + std::to_string(materials->size()) + " materials, " +
-              std::to_string(flagged.size()) + " contradictions");
+  console.say(o.output + ": " + counted(materials->size(), "material") + ", " +
+              counted(flagged.size(), "contradiction"));
   return kDone;
 }
 

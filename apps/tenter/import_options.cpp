@@ -24,7 +24,7 @@ Result<int> finishMeasurement(const Measurement& measurement, const std::string&
   console.answer["measurement"] = folder;
   console.answer["protocol"] = measurement.protocol;
   console.answer["frames"] = measurement.frames.size();
-  console.say(folder + ": " + std::to_string(measurement.frames.size()) + " frames");
+  console.say(folder + ": " + counted(measurement.frames.size(), "frame"));
   return kDone;
 }
 

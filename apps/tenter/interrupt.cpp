@@ -21,6 +21,11 @@ void catchInterrupts() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
+void stopCatchingInterrupts() {
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+}
+
 bool interrupted() { return g_interrupted != 0; }
 
 }  // namespace tenter::app

@@ -7,6 +7,9 @@ namespace tenter::app {
 /// program.
 void catchInterrupts();
 
+/// For a verb that writes nothing and has nothing to keep: the first one ends the program again.
+void stopCatchingInterrupts();
+
 /// Whether somebody asked to stop. Solvers poll it and keep the best so far.
 bool interrupted();
 

@@ -50,6 +50,10 @@ int obey(const Action& action, Console& console) {
     return kInternal;
   }
   console.printAnswer();
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    Console::complain("standard output: the answer cannot be written");
+    return static_cast<int>(ErrorKind::kBadInput);
+  }
   return code;
 }
 

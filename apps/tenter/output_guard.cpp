@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "output_guard.h"
 
+#include <unistd.h>
+
+#include <cerrno>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <system_error>
 
 #include "tenter/mechanics/material.h"
 
@@ -24,10 +28,30 @@ std::string beginningOf(const fs::path& file) {
   return text;
 }
 
+/// Whether something may be put below the nearest folder that is there: hours of a fit are not to
+/// end at a folder that nobody may write to.
+Result<void> checkPlace(const fs::path& output) {
+  std::error_code error;
+  fs::path folder = fs::absolute(output, error).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  do {
+    folder = folder.parent_path();
+  } while (folder != folder.parent_path() && !fs::exists(folder, error));
+  const std::string shown = output.string();
+  if (!fs::is_directory(folder, error)) {
+    return badInput(shown, "", "cannot be written: " + folder.string() + " is not a folder");
+  }
+  if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
+  return badInput(
+      shown, "",
+      "cannot be written: " + folder.string() + ": " + std::generic_category().message(errno));
+}
+
 /// True where a file may be put without asking what is in it.
 Result<bool> isFree(const fs::path& file) {
   std::error_code error;
   if (file.filename().empty()) return usageError("'" + file.string() + "' is not a file name");
+  if (auto ok = checkPlace(file); !ok) return ok.error();
   const auto status = fs::status(file, error);
   if (!fs::exists(status)) return true;
   if (!fs::is_regular_file(status)) {
@@ -58,6 +82,7 @@ Result<void> checkMaterialOutput(const fs::path& file) {
 
 Result<void> checkOutputFolder(const fs::path& folder, std::string_view marker) {
   std::error_code error;
+  if (auto ok = checkPlace(folder); !ok) return ok.error();
   const auto status = fs::status(folder, error);
   if (!fs::exists(status)) return {};
   if (!fs::is_directory(status)) {

@@ -25,6 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 constexpr double kDegree = 0.017453292519943295;
 constexpr const char* kReport = "report.html";
+/// Written first, so that a demo that was stopped can be started again into the same folder.
+constexpr const char* kMarker = "demo.json";
 
 struct Options {
   std::string output = "tenter-demo", data, fabric = "knit-12";
@@ -171,6 +173,10 @@ Result<void> writeExports(const Material& material, const fs::path& folder, Repo
   return {};
 }
 
+Error stopped(const fs::path& folder) {
+  return notConverged("stopped; what was done so far is in " + folder.string());
+}
+
 /// Fit, evaluate on everything, write the material, add to the report. True if the fit converged.
 Result<bool> follow(const Course& course, const fs::path& folder, Report& report,
                     Console& console) {
@@ -179,6 +185,7 @@ Result<bool> follow(const Course& course, const fs::path& folder, Report& report
   if (!fit) return fit.error();
   if (auto done = writeMaterial(folder / (course.name + ".json"), fit->material); !done)
     return done.error();
+  if (interrupted()) return stopped(folder);
   std::vector<Measurement> all = course.fitted;
   all.insert(all.end(), course.held_out.begin(), course.held_out.end());
   std::vector<bool> held(all.size(), false);
@@ -223,14 +230,17 @@ Result<bool> follow(const Course& course, const fs::path& folder, Report& report
 }
 
 Result<int> run(const Options& o, Console& console) {
-  if (auto free = checkOutputFolder(o.output, kReport); !free) return free.error();
-  std::error_code failed;
-  fs::create_directories(o.output, failed);
-  if (failed) return badInput(o.output, "", "the folder cannot be made: " + failed.message());
+  if (auto free = checkOutputFolder(o.output, kMarker); !free) return free.error();
+  const nlohmann::json marker = {{"kind", "demo"}, {"fabric", o.fabric}, {"seed", o.seed}};
+  const fs::path marker_file = fs::path(o.output) / kMarker;
+  if (auto done = writeFileAtomically(marker_file, marker.dump(2) + "\n"); !done) {
+    return done.error();
+  }
 
   Report report("Tenter: from measurements to a material");
   Course strips;
   strips.options.threads = o.threads;
+  strips.options.cancelled = interrupted;
   const auto nylon = nylonFolder(o);
   strips.name = nylon ? "coated-nylon" : "virtual-strips";
   auto measured = nylon ? nylonMeasurements(*nylon) : virtualStrips(o);
@@ -243,9 +253,12 @@ Result<int> run(const Options& o, Console& console) {
   Course rig;
   rig.name = o.fabric;
   rig.options.threads = o.threads;
+  rig.options.cancelled = interrupted;
   rig.options.law_uncertainty = false;
   console.say("capturing seven protocols of " + o.fabric + " on the virtual rig ...");
-  if (auto done = captureAll(o, rig); !done) return done.error();
+  if (auto done = captureAll(o, rig); !done) {
+    return interrupted() ? stopped(o.output) : done.error();
+  }
   for (const auto* group : {&rig.fitted, &rig.held_out}) {
     for (const Measurement& m : *group) {
       if (auto done = writeMeasurement(fs::path(o.output) / (o.fabric + "-" + m.protocol), m);

@@ -18,6 +18,8 @@ namespace tenter::app {
 namespace {
 
 constexpr std::string_view kOutputMarker = "\"displacement_m\"";
+/// A mesh drawn in millimetres exceeds this, a garment or a curtain does not.
+constexpr double kLargeSheet_m = 20.0;
 
 struct Options {
   std::string mesh, material, output, gravity = "0,0,-9.80665";
@@ -180,9 +182,19 @@ void tell(const Options& o, const EquilibriumSummary& s, bool converged, Console
                     {"file", o.output}};
   char text[200];
   std::snprintf(text, sizeof text,
-                "%s: residual %.3g N after %d Newton steps, smallest eigenvalue %.4g 1/s^2, %.2f s",
+                "%s: residual %.3g N after %d Newton steps, smallest eigenvalue %.4g 1/s^2, %.2g s",
                 o.output.c_str(), s.residual_N, s.newton_steps, s.lambda_min_per_s2, s.seconds);
   console.say(text);
+}
+
+void warnIfLarge(const Options& o, const ClothSystem& system, const Console& console) {
+  const Points3& x = system.sheet().rest.positions;
+  const double size_m = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).maxCoeff();
+  if (size_m <= kLargeSheet_m) return;
+  char text[96];
+  std::snprintf(text, sizeof text, ": the sheet is %.4g m wide; coordinates must be in metres",
+                size_m);
+  console.warn(o.mesh + text);
 }
 
 Result<int> run(const Options& o, Console& console) {
@@ -192,6 +204,7 @@ Result<int> run(const Options& o, Console& console) {
   }
   auto system = systemOf(o);
   if (!system) return system.error();
+  warnIfLarge(o, *system, console);
   ClothState state = system->restState();
   EquilibriumSolver solver(*system);
   EquilibriumSummary summary;

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "fit_options.h"
+#include "interrupt.h"
 #include "verbs.h"
 
 namespace tenter::app {
@@ -80,6 +81,7 @@ void say(const EvaluatedTest& test, const Console& console) {
 }
 
 Result<int> run(const Options& o, Console& console) {
+  stopCatchingInterrupts();
   std::vector<std::string> folders = o.measurements;
   for (const std::string& truth : o.truths) folders.push_back(truth + "/exact");
   if (folders.empty()) return usageError("there is no measurement to evaluate against");
@@ -102,7 +104,7 @@ Result<int> run(const Options& o, Console& console) {
     unconverged += test.residual.unconverged_frames;
   }
   if (unconverged == 0) return kDone;
-  console.warn(std::to_string(unconverged) + " frames did not converge");
+  console.warn(counted(static_cast<std::size_t>(unconverged), "frame") + " did not converge");
   return static_cast<int>(ErrorKind::kNotConverged);
 }
 

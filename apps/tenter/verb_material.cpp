@@ -52,7 +52,11 @@ Result<int> check(const Options& o, Console& console) {
                     {"component", finding.component},
                     {"text", finding.text}});
     const std::string where = finding.component.empty() ? "" : finding.component + ": ";
-    console.say(std::string(nameOf(finding.severity)) + ": " + where + finding.text);
+    if (finding.severity == Severity::kError) {
+      Console::complain(o.file + ": " + where + finding.text);
+    } else {
+      console.say(std::string(nameOf(finding.severity)) + ": " + where + finding.text);
+    }
   }
   console.answer["ok"] = ok;
   console.say(o.file + (ok ? ": ok" : ": not usable as it is"));

@@ -88,6 +88,7 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
         options.protocol + ", frame " + std::to_string(done) + " of " + std::to_string(all));
   };
   const auto captured = captureMeasurement(options);
+  if (!captured && interrupted()) return notConverged("stopped; nothing was written");
   if (!captured) return captured.error();
   if (auto done = writeMeasurement(command.output, captured->measurement); !done) {
     return done.error();
@@ -104,8 +105,8 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
                     {"factorizations", statistics.factorizations},
                     {"largest_residual_N", statistics.largest_residual_N},
                     {"seconds", statistics.seconds}};
-  console.say(command.output + ": " + std::to_string(captured->measurement.frames.size()) +
-              " frames of " + options.protocol);
+  console.say(command.output + ": " + counted(captured->measurement.frames.size(), "frame") +
+              " of " + options.protocol);
   return kDone;
 }
 

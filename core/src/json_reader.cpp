@@ -55,7 +55,7 @@ std::optional<std::size_t> tooDeepAt(std::string_view text) {
 /// random.
 struct DuplicateKeyFinder {
   std::vector<std::set<std::string>> keys;
-  std::string duplicate;
+  std::string duplicate, last;
 
   bool operator()(int /*depth*/, Json::parse_event_t event, Json& parsed) {
     if (event == Json::parse_event_t::object_start) {
@@ -65,6 +65,7 @@ struct DuplicateKeyFinder {
     } else if (event == Json::parse_event_t::key) {
       const auto& key = parsed.get_ref<const std::string&>();
       if (!keys.back().insert(key).second) duplicate = key;
+      last = key;
     }
     return true;
   }
@@ -113,7 +114,10 @@ Result<Json> parseJson(std::string_view text, const std::string& file, const std
                     truncated ? "the JSON ends too early" : "is not valid JSON",
                     truncated ? "the file may have been cut off; write it again" : "");
   } catch (const Json::exception&) {
-    return badInput(file, place, "holds a number that no double can represent");
+    // The parser does not say where; the key that it read last does.
+    const std::string separator = place.empty() || finder.last.empty() ? "" : ": ";
+    return badInput(file, place + separator + finder.last,
+                    "holds a number that no double can represent");
   }
   if (!finder.duplicate.empty()) {
     return badInput(file, place.empty() ? finder.duplicate : place + ": " + finder.duplicate,

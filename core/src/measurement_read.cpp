@@ -240,7 +240,9 @@ Result<void> readFrames(const fs::path& folder, int version, Measurement& m) {
 Result<Measurement> readMeasurement(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    return badInput(folder.string(), "", "is not a folder", "name a measurement folder");
+    const std::string reason =
+        error ? "cannot be read: " + error.message() : std::string("is not a folder");
+    return badInput(folder.string(), "", reason, "name a measurement folder");
   }
   const std::string header_file = (folder / format::kHeaderFile).string();
   auto header = readJsonFile(header_file);

@@ -16,21 +16,19 @@
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <mutex>
 #include <new>
-#include <string_view>
 
-#include "text_scan.h"
+#include "vtk_guard.h"
 
 namespace tenter {
 
 namespace {
 
 constexpr int kMaxComponents = 9;
-/// zlib packs at most 1032 to 1, so a file cannot hold more items than this a byte.
-constexpr std::size_t kMaxItemsPerByte = 1100;
 
 /// First complaint of VTK in this thread while a reader or writer of ours runs.
 thread_local std::string* active_complaint = nullptr;
@@ -106,7 +104,7 @@ Eigen::MatrixXd matrixOf(vtkDataArray& array) {
   return out;
 }
 
-/// Numeric arrays of points or cells; text arrays carry nothing for us.
+/// Numeric arrays of points or cells.
 Result<void> readArrays(vtkDataSetAttributes& attributes, vtkIdType count, const std::string& kind,
                         const std::string& file, std::map<std::string, Eigen::MatrixXd>& out) {
   for (int i = 0; i < attributes.GetNumberOfArrays(); ++i) {
@@ -236,28 +234,10 @@ void fillPolyData(vtkPolyData& poly, const TriangleMesh& mesh, const MeshData& d
   for (const auto& [name, values] : data.cell) addArray(*poly.GetCellData(), name, values);
 }
 
-/// VTK allocates what a file announces before it reads; counts that the file cannot hold end here.
-Result<void> checkAnnouncedCounts(std::string_view content, const std::string& file) {
-  constexpr std::string_view kAttribute = "NumberOf";
-  const std::size_t limit = content.size() * kMaxItemsPerByte;
-  for (auto at = content.find(kAttribute); at != std::string_view::npos;
-       at = content.find(kAttribute, at + 1)) {
-    std::string_view rest = content.substr(at, 200);
-    const std::string name(rest.substr(0, rest.find_first_of("= \"'\t\r\n")));
-    rest.remove_prefix(name.size());
-    // Anything but ="count" is no attribute: array names may begin like this too.
-    if (!rest.starts_with("=\"")) continue;
-    const auto count = parseNumber<std::uint64_t>(rest.substr(2, rest.find('"', 2) - 2));
-    if (count && *count <= limit) continue;
-    return badInput(file, name, "is no count, or more than the file can hold");
-  }
-  return {};
-}
-
 }  // namespace
 
 Result<MeshFile> parseVtp(const std::string& content, const std::string& file) {
-  if (auto done = checkAnnouncedCounts(content, file); !done) return done.error();
+  if (auto done = checkVtkXml(content, file); !done) return done.error();
   ComplaintScope complaint;
   try {
     const vtkNew<vtkXMLPolyDataReader> reader;

@@ -438,7 +438,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(BrokenMeasurementFolderTest, IsNamed) {
   const TemporaryFolder folder;
-  EXPECT_THAT(readMeasurement(folder / "absent").error().reason, HasSubstr("not a folder"));
+  EXPECT_THAT(readMeasurement(folder / "absent").error().reason, HasSubstr("No such file"));
   EXPECT_THAT(readMeasurement(folder.write("file", "")).error().reason, HasSubstr("not a folder"));
   EXPECT_THAT(readMeasurement(folder.path()).error().file, HasSubstr("measurement.json"));
 }

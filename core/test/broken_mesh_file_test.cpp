@@ -61,6 +61,20 @@ std::string vtp(const std::string& points, const std::string& ids, const std::st
 const char* const kPoints = "0 0 0 1 0 0 0 1 0";
 const char* const kThree = "0 0 0\n1 0 0\n0 1 0\n";
 
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+/// Three vertices in plain text, and an array of packed data.
+std::string packedVtp(const std::string& data) {
+  const std::string array =
+      "<PointData><DataArray type=\"Float64\" Name=\"uv\" NumberOfComponents=\"2\" "
+      "format=\"binary\">";
+  const std::string whole = vtp(kPoints, "0 1 2", "3", array + data + "</DataArray></PointData>");
+  return replaced(whole, "header_type=\"UInt64\"",
+                  "header_type=\"UInt32\" compressor=\"vtkZLibDataCompressor\"");
+}
+
 TEST(MeshFileTest, TheUndamagedFilesAreRead) {
   const TemporaryFolder folder;
   EXPECT_TRUE(readMesh(folder.write("a.obj", obj("f 1 2 3\n"))).ok());
@@ -147,7 +161,36 @@ INSTANTIATE_TEST_SUITE_P(
                        "<PointData><DataArray type=\"Float64\" Name=\"uv\" "
                        "NumberOfComponents=\"3\" format=\"ascii\">1 2 3 4 5 6 7 8 "
                        "9</DataArray></PointData>"),
-                   "uv", "two components"}),
+                   "uv", "two components"},
+        BrokenFile{"vtp_text_array", "m.vtp",
+                   vtp(kPoints, "0 1 2", "3",
+                       "<PointData><DataArray type = 'String' Name=\"a\" format=\"ascii\">65 66"
+                       "</DataArray></PointData>"),
+                   "array \"a\"", "text"},
+        BrokenFile{"vtp_entity", "m.vtp",
+                   vtp(kPoints, "0 1 2", "3",
+                       "<PointData><DataArray type=\"&#83;tring\" Name=\"a\" "
+                       "format=\"ascii\">65 66</DataArray></PointData>"),
+                   "byte", "entities"},
+        BrokenFile{"vtp_quoted_bracket", "m.vtp",
+                   vtp(kPoints, "0 1 2", "3",
+                       "<PointData><DataArray Name=\"a>b\" type=\"Float64\" format=\"ascii\">1 2 3"
+                       "</DataArray></PointData>"),
+                   "array", "does not end"},
+        BrokenFile{"vtp_single_quotes", "m.vtp",
+                   replaced(vtp(kPoints, "0 1 2", "3"), "NumberOfPoints=\"3\"",
+                            "NumberOfPoints = '99999999999'"),
+                   "NumberOfPoints", "more than the file can hold"},
+        // Blocks that VTK would look up without asking: no block but a last one, half a header,
+        // and a packed size that is missing.
+        BrokenFile{"vtp_no_block_but_bytes", "m.vtp", packedVtp("AAAAAACAAAABAAAA"), "array \"uv\"",
+                   "compressed blocks"},
+        BrokenFile{"vtp_half_header", "m.vtp", packedVtp("AQAAAACA"), "array \"uv\"",
+                   "compressed blocks"},
+        BrokenFile{"vtp_too_many_blocks", "m.vtp", packedVtp("/////wCAAAAAAAAA"), "array \"uv\"",
+                   "compressed blocks"},
+        BrokenFile{"vtp_no_packed_size", "m.vtp", packedVtp("AQAAAACAAAAwAAAA"), "array \"uv\"",
+                   "compressed blocks"}),
     [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

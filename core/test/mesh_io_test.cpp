@@ -84,6 +84,33 @@ TEST(ObjTest, ASeamLeavesNoMaterialCoordinates) {
   EXPECT_FALSE(partial->mesh.hasUv());
 }
 
+TEST(VtpTest, ReadsWhatParaViewWrites) {
+  // Appended base64, big-endian, zlib: as other programs set their writers.
+  const TemporaryFolder folder;
+  const std::string packed =
+      "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"BigEndian\" header_type=\"UInt64\" "
+      "compr"
+      "essor=\"vtkZLibDataCompressor\"><PolyData><Piece NumberOfPoints=\"3\" "
+      "NumberOfPolys=\"1\"><Poi"
+      "nts><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"appended\" "
+      "offset=\"0\"/></Poi"
+      "nts><Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"appended\" "
+      "offset=\"68\"/><D"
+      "ataArray type=\"Int64\" Name=\"offsets\" format=\"appended\" "
+      "offset=\"132\"/></Polys></Piece></P"
+      "olyData><AppendedData encoding=\"base64\">_AAAAAAAAAAEAAAAAAAAASAAAAAAAAAAAAAAAAAAAABI=eNp"
+      "jYMAO7D8w4AXo8gBKKAJfAAAAAAAAAAEAAAAAAAAAGAAAAAAAAAAAAAAAAAAAAA8=eNpjYEABjFCaCQAAIwAEAAA"
+      "AAAAAAAEAAAAAAAAACAAAAAAAAAAAAAAAAAAAAAw=eNpjYAADZgAACwAE</AppendedData></VTKFile>";
+  const auto read = readMesh(folder.write("m.vtp", packed));
+  ASSERT_TRUE(read.ok()) << read.error().message();
+  EXPECT_EQ(read->mesh.positions.col(1), Vec3(1, 0, 0));
+  EXPECT_THAT(read->mesh.triangles, ElementsAre(Triangle{0, 1, 2}));
+  std::string damaged = packed;
+  damaged[damaged.find('_') + 7] = '/';
+  EXPECT_THAT(readMesh(folder.write("n.vtp", damaged)).error().reason,
+              testing::HasSubstr("compressed blocks"));
+}
+
 template <class T>
 void appendBytes(std::string& out, T value, bool big_endian) {
   std::string bytes(sizeof(T), '\0');

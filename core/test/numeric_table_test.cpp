@@ -28,16 +28,18 @@ TEST_P(GoodTableTest, IsRead) {
   EXPECT_EQ((*table)(0, 1), -2e-3);
 }
 
-INSTANTIATE_TEST_SUITE_P(Separators, GoodTableTest,
-                         testing::Values(GoodTable{"1.5,-2e-3\n3,4\n", 2},
-                                         GoodTable{"1.5;-2e-3", 1},
-                                         GoodTable{"mm,N\r\n1.5, -2e-3\r\n", 1},
-                                         GoodTable{" 1.5\t-2e-3\n", 1},
-                                         GoodTable{"# note\n\n+1.5   -2e-3 \n", 1},
-                                         GoodTable{"\xEF\xBB\xBF"
-                                                   "1.5,-2e-3\n",
-                                                   1},
-                                         GoodTable{"displacement force\n1.5 -2e-3\n", 1}));
+INSTANTIATE_TEST_SUITE_P(
+    Separators, GoodTableTest,
+    testing::Values(GoodTable{"1.5,-2e-3\n3,4\n", 2}, GoodTable{"1.5;-2e-3", 1},
+                    GoodTable{"mm,N\r\n1.5, -2e-3\r\n", 1}, GoodTable{" 1.5\t-2e-3\n", 1},
+                    GoodTable{"# note\n\n+1.5   -2e-3 \n", 1},
+                    GoodTable{"\xEF\xBB\xBF"
+                              "1.5,-2e-3\n",
+                              1},
+                    GoodTable{"displacement force\n1.5 -2e-3\n", 1},
+                    GoodTable{"Weg [mm];Kraft [N]\r\n1,5;-2e-3\r\n\r\n", 1},
+                    GoodTable{"1,5\t-0,002\n2,5\t3\n", 2}, GoodTable{"1.5,\t-2e-3\n", 1},
+                    GoodTable{"\"mm\",\"N\"\n\"1.5\",\"-2e-3\"\n", 1}));
 
 struct BadTable {
   const char* text;
@@ -69,7 +71,10 @@ INSTANTIATE_TEST_SUITE_P(
                     BadTable{"1,nan\n", "line 1, column 2", "not finite"},
                     BadTable{"1,inf\n", "line 1, column 2", "not finite"},
                     BadTable{"1,1e999\n", "line 1, column 2", "not a number"},
-                    BadTable{"1,5;2,5\n", "line 1", "4 columns"}));
+                    BadTable{"1,5;2.5\n", "line 1, column 2", "mixed"},
+                    BadTable{"0,5;2\n1;1.234,5\n", "line 2, column 2", "not a number"},
+                    BadTable{"0,5;1,234,567\n", "line 1, column 2", "not a number"},
+                    BadTable{"0.5;1\n1.5;1,234\n", "line 2, column 2", "mixed"}));
 
 TEST(NumericTableTest, ReadsRealTensileData) {
   const auto file = test_support::findData("nylon-offaxis/angle-00.csv");

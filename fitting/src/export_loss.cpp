@@ -114,6 +114,11 @@ void noteWindow(ExportedMaterial& exported, const SheetResponse& response) {
                               " was not seen by any measurement; the exported number is a guess");
     }
   }
+  // Targets take no negative stiffness; what they make of it is not what the material says.
+  for (const MaterialFinding& finding : checkMaterial(response.material())) {
+    if (finding.severity != MaterialFinding::Severity::kError) continue;
+    exported.lost.push_back(finding.component + ": " + finding.text);
+  }
   exported.lost.emplace_back("standard deviations, correlations and provenance");
 }
 

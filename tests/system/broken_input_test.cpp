@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "program.h"
 #include "tenter/test_support/temporary_folder.h"
@@ -48,17 +49,29 @@ Arguments drape(const std::string& file) {
           "--k-bend", "1e-4", "--fix", "0",   "-o",          "output"};
 }
 
-constexpr const char* kMaterial = R"({"schema_version": 1, "fabric": "f", "law": "stvk",
- "areal_density_kg_per_m2": DENSITY, "components": [{"name": "stretch_weft", "status": "assumed",
- "strain_measure": "(|w_u|^2 - 1) / 2", "strain_unit": "1", "stiffness_unit": "UNIT", "even": false,
- "tangent_rule": "hermite", "knots": [{"strain": 0, "stiffness": 100, "tangent": 0}],
- "observed_strain": [0, 0]}]})";
+Arguments checkMaterial(const std::string& file) { return {"material", "check", file}; }
 
-std::string material(const std::string& density, const std::string& unit) {
-  std::string text = kMaterial;
-  text.replace(text.find("DENSITY"), 7, density);
-  text.replace(text.find("UNIT"), 4, unit);
-  return text;
+/// A sound material of one constant a component, with one thing said otherwise.
+std::string material(const std::string& from = "", const std::string& to = "") {
+  std::string components;
+  for (const char* name :
+       {"stretch_weft", "stretch_warp", "shear", "bend_weft", "bend_warp", "bend_diagonal"}) {
+    const bool bends = std::string(name).starts_with("bend");
+    const bool stretches = std::string(name).starts_with("stretch");
+    components += components.empty() ? "" : ",\n ";
+    components += std::string("{\"name\": \"") + name +
+                  R"(", "status": "assumed", "strain_measure": "e",
+  "strain_unit": ")" +
+                  (bends ? "1/m" : "1") + R"(", "stiffness_unit": ")" + (bends ? "N m" : "N/m") +
+                  R"(", "even": )" + (stretches ? "false" : "true") +
+                  R"(, "tangent_rule": "hermite", "observed_strain": [0, 0],
+  "knots": [{"strain": 0, "stiffness": 100, "tangent": 0}, {"strain": 0.5, "stiffness": 90, "tangent": 0}]})";
+  }
+  std::string text =
+      R"({"schema_version": 1, "fabric": "f", "law": "stvk", "variant": "orthotropic",
+ "areal_density_kg_per_m2": 0.1, "components": [)" +
+      components + "]}";
+  return from.empty() ? text : text.replace(text.find(from), from.size(), to);
 }
 
 const std::string kSquare = "v 0 0 0\nv 0.1 0 0\nv 0.1 0.1 0\nv 0 0.1 0\n";
@@ -77,6 +90,12 @@ std::vector<Broken> brokenFiles() {
        "line 5", "metres"},
       {"csv_swapped_units", "a.csv", rows + "500,6\n", importTensile("a.csv"), "line 6", "longer"},
       {"csv_few", "a.csv", "0,1\n1,2\n", importTensile("a.csv"), "a.csv", "2 rows"},
+      {"csv_mixed_decimals", "a.csv", "0;1\n0,1;2\n0.2;3\n0.3;4\n0.4;5\n", importTensile("a.csv"),
+       "line 3", "mixed"},
+      {"csv_no_rise", "a.csv", "0,5\n0.1,4\n0.2,3\n0.3,2\n0.4,1\n", importTensile("a.csv"),
+       "line 1", "rise"},
+      {"csv_pushed", "a.csv", "0,-1\n0.1,-2\n0.2,-3\n0.3,-4\n0.4,-5\n", importTensile("a.csv"),
+       "a.csv", "positive"},
       {"csv_binary", "a.csv", std::string("\0\1\2\3\n\4\5", 7), importTensile("a.csv"), "a.csv",
        "line"},
       {"csv_is_folder", "a.csv/x", "", importTensile("a.csv"), "a.csv", "folder"},
@@ -89,6 +108,15 @@ std::vector<Broken> brokenFiles() {
        importArcsim("a.json"), "stretching", "6"},
       {"arcsim_density", "a.json", "{\"density\": -1, \"stretching\": []" + arcsim_end,
        importArcsim("a.json"), "density", "above 0"},
+      {"arcsim_nan", "a.json", "{\"density\": nan" + arcsim_end, importArcsim("a.json"), "line 1",
+       "JSON"},
+      {"arcsim_grams", "a.json", "{\"density\": 324, \"stretching\": []" + arcsim_end,
+       importArcsim("a.json"), "density", "unit"},
+      {"kes_number", "k.csv", "property,unit,A\nEMT,%,five\n", importKes("k.csv"), "line 2",
+       "five"},
+      {"kes_columns", "k.csv", "property,unit,A\nEMT,%,5,6\n", importKes("k.csv"), "line 2",
+       "4 columns"},
+      {"kes_name", "k.csv", "property,unit,../A\nEMT,%,5\n", importKes("k.csv"), "line 1", "../A"},
       {"kes_unit", "k.csv", "property,unit,A\nEMT,mm,5\n", importKes("k.csv"), "line 2", "mm"},
       {"kes_incomplete", "k.csv", "property,unit,A\nEMT,%,5\n", importKes("k.csv"), "k.csv",
        "missing"},
@@ -96,12 +124,36 @@ std::vector<Broken> brokenFiles() {
        "too early"},
       {"material_field", "m.json", "{\"schema_version\": 1}", exportFrom("m.json"), "fabric",
        "missing"},
-      {"material_negative_mass", "m.json", material("-0.1", "N/m"), exportFrom("m.json"),
+      {"material_negative_mass", "m.json", material("0.1,", "-0.1,"), exportFrom("m.json"),
        "areal_density_kg_per_m2", "at least 0"},
-      {"material_unit", "m.json", material("0.1", "gf/cm"), exportFrom("m.json"), "stiffness_unit",
-       "N/m"},
-      {"material_components", "m.json", material("0.1", "N/m"), exportFrom("m.json"), "m.json",
-       "stretch_warp"},
+      {"material_grams", "m.json", material("0.1,", "61.6,"), exportFrom("m.json"),
+       "areal_density_kg_per_m2", "unit"},
+      {"material_nan", "m.json", material("0.1,", "NaN,"), exportFrom("m.json"), "line 2", "JSON"},
+      {"material_beyond_double", "m.json", material("0.1,", "1e400,"), exportFrom("m.json"),
+       "areal_density_kg_per_m2", "double"},
+      {"material_unit", "m.json", material("\"N/m\"", "\"gf/cm\""), exportFrom("m.json"),
+       "components[0].stiffness_unit", "N/m"},
+      {"material_components", "m.json", material("stretch_warp", "stretch_bias"),
+       exportFrom("m.json"), "components[1].name", "stretch_bias"},
+      {"material_component_twice", "m.json", material("stretch_warp", "stretch_weft"),
+       exportFrom("m.json"), "components[1].name", "before"},
+      {"material_law", "m.json", material("\"stvk\"", "\"kevlar\""), exportFrom("m.json"), "law",
+       "unknown"},
+      {"material_knots", "m.json", material("\"strain\": 0.5", "\"strain\": -0.5"),
+       exportFrom("m.json"), "components[0].knots", "increase"},
+      {"material_covariance", "m.json",
+       material("\"components\"",
+                "\"covariance\": {\"labels\": [\"shear[0]\"], \"matrix\": [[1, 0], [0, 1]]}, "
+                "\"components\""),
+       exportFrom("m.json"), "covariance.matrix", "2 rows"},
+      {"material_variance", "m.json",
+       material("\"components\"",
+                "\"covariance\": {\"labels\": [\"shear[0]\"], \"matrix\": [[-1]]}, \"components\""),
+       exportFrom("m.json"), "covariance.matrix[0][0]", "negative"},
+      {"material_negative_stiffness", "m.json", material("90", "-90"), checkMaterial("m.json"),
+       "stretch_weft", "-90"},
+      {"material_deep", "m.json", std::string(100'000, '{'), exportFrom("m.json"), "line 1", ""},
+      {"material_folder", "m.json/x", "", exportFrom("m.json"), "m.json", "folder"},
       {"mesh_index", "s.obj", kSquare + "f 1 2 9\n", drape("s.obj"), "line 5", "9"},
       {"mesh_nan", "s.obj", "v 0 0 nan\n" + kSquare + "f 1 2 3\n", drape("s.obj"), "line 1", ""},
       {"mesh_pieces", "s.obj",
@@ -109,6 +161,13 @@ std::vector<Broken> brokenFiles() {
        "s.obj", "piece"},
       {"mesh_duplicate", "s.obj", kSquare + "v 0.1 0 0\nf 1 2 3\nf 1 3 4\nf 5 3 2\n",
        drape("s.obj"), "s.obj", ""},
+      {"mesh_third_at_edge", "s.obj", kSquare + "v 0 0 1\nf 1 2 3\nf 1 3 4\nf 3 1 5\n",
+       drape("s.obj"), "triangle 2", "third"},
+      {"mesh_loose", "s.obj", kSquare + "v 0 0 1\nf 1 2 3\nf 1 3 4\n", drape("s.obj"), "vertex 4",
+       "no triangle"},
+      {"mesh_ply_cut", "s.ply", "ply\nformat ascii 1.0\nelement vertex 3\n", drape("s.ply"),
+       "header", "end"},
+      {"mesh_vtp_cut", "s.vtp", "<VTKFile type=\"PolyData\"><Poly", drape("s.vtp"), "VTP", "XML"},
       {"mesh_empty", "s.obj", "", drape("s.obj"), "s.obj", ""},
       {"mesh_kind", "s.stl", "solid", drape("s.stl"), "s.stl", ""},
       {"measurement_missing", "", "", {"fit", "nowhere", "-o", "output"}, "nowhere", ""},
@@ -139,6 +198,26 @@ TEST_P(BrokenInputTest, ExitsWithThreeNamesPlaceAndReasonAndLeavesNothing) {
 
 INSTANTIATE_TEST_SUITE_P(Files, BrokenInputTest, ::testing::ValuesIn(brokenFiles()),
                          [](const auto& of) { return of.param.name; });
+
+TEST(BrokenFile, LinksInACircleAndPipesAreRefusedAtOnce) {
+  TemporaryFolder folder;
+  std::filesystem::create_symlink("b.json", folder / "a.json");
+  std::filesystem::create_symlink("a.json", folder / "b.json");
+  ASSERT_EQ(mkfifo((folder / "pipe.json").c_str(), 0600), 0);
+  const Outcome circle = tenter(exportFrom("a.json"), folder.path());
+  EXPECT_EQ(circle.exit_code, 3);
+  EXPECT_THAT(circle.err, HasSubstr("a.json: cannot be read"));
+  const Outcome pipe = tenter(exportFrom("pipe.json"), folder.path());
+  EXPECT_EQ(pipe.exit_code, 3);
+  EXPECT_THAT(pipe.err, HasSubstr("not a regular file"));
+}
+
+TEST(BrokenFile, TheTablesStartFromAMaterialThatIsSound) {
+  TemporaryFolder folder;
+  folder.write("m.json", material());
+  EXPECT_EQ(tenter(checkMaterial("m.json"), folder.path()).exit_code, 0);
+  EXPECT_EQ(tenter(exportFrom("m.json"), folder.path()).exit_code, 0);
+}
 
 TEST(Overwriting, RefusesWhatIsNotOurs) {
   TemporaryFolder folder;
