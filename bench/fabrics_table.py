@@ -82,7 +82,7 @@ def cell(test):
 def table(arguments, rows):
     lines = [f"Captures: {arguments.frames} frames a protocol, specimen of {arguments.nodes} nodes a side, seed {arguments.seed}, all "
              "noise and friction on. Replica of 25 x 25 nodes. Each cell: NRMSE and RMS of the stacked clip forces, all components, or "
-             "RMS of the vertices' positions; `complex-shear` and `corner-pull` took no part in the fit. Time on one core.", ""]
+             "RMS of the vertices' positions; `complex-shear` and `corner-pull` took no part in the fit. Time on one core of a busy machine.", ""]
     for fabric in arguments.fabrics:
         lines += [f"### {fabric}", "", "| model, variant | " + " | ".join(FITTED + HELD_OUT) + " | converged | s |",
                   "|---|" + "---|" * (len(FITTED + HELD_OUT) + 2)]
