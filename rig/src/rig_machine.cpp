@@ -34,6 +34,7 @@ RigMachine::RigMachine(RigConfig config)
     : config_(std::move(config)), cap_m_per_s_(speedCap_m_per_s(config_.limits)) {
   setpoints_m_.resize(config_.axes.size());
   origins_m_.resize(config_.axes.size());
+  begun_m_.resize(config_.axes.size());
   known_m_.resize(config_.axes.size());
   tares_N_.resize(config_.cells.size());
 }
@@ -141,6 +142,18 @@ void RigMachine::watchLoading() {
   }
 }
 
+/// Not where it was sent. Whoever begins beyond the travel is not behind for coming back.
+bool RigMachine::strays(std::size_t axis) const {
+  const AxisConfig& device = config_.axes[axis].device;
+  const double allowed_m = config_.limits.following_error_m;
+  const double inside_m = std::clamp(known_m_[axis], device.travel_min_m, device.travel_max_m);
+  const double beyond_m = std::abs(known_m_[axis] - inside_m);
+  const double begun_beyond_m = std::abs(
+      begun_m_[axis] - std::clamp(begun_m_[axis], device.travel_min_m, device.travel_max_m));
+  return std::abs(setpoints_m_[axis] - inside_m) > allowed_m ||
+         beyond_m > begun_beyond_m + allowed_m;
+}
+
 void RigMachine::watchAxes() {
   const bool follows =
       activity_ == Activity::kJog || activity_ == Activity::kRun || activity_ == Activity::kUnload;
@@ -150,8 +163,7 @@ void RigMachine::watchAxes() {
     const bool lost = !axis.position_m || !axis.energised || !axis.fault.empty();
     if (lost && activity_ == Activity::kUnload) continue;  // the others still unload
     if (lost) return trip(name, axis.fault.empty() ? "no-current" : axis.fault, "");
-    if (follows &&
-        std::abs(setpoints_m_[i] - *axis.position_m) > config_.limits.following_error_m) {
+    if (follows && strays(i)) {
       return trip(name, "following-error",
                   "is at " + std::to_string(*axis.position_m) + " m instead of " +
                       std::to_string(setpoints_m_[i]) + " m");
@@ -172,6 +184,7 @@ void RigMachine::trip(const std::string& source, const std::string& fault,
   const bool was_moving = activity_ != Activity::kNone && activity_ != Activity::kTare;
   const bool was_unloading = activity_ == Activity::kUnload;
   endRun(fault);
+  loading_ = false;
   changeState(RigState::kFault, source + ": " + fault);
   activity_ = Activity::kNone;
   if (was_unloading) unloadingEnded(source + ": " + fault);
@@ -183,6 +196,7 @@ void RigMachine::stop(const std::string& why, bool halt_needed) {
   orders_->release_halt = false;
   if (activity_ == Activity::kUnload) unloadingEnded(why);
   endRun(why);
+  loading_ = false;
   activity_ = Activity::kNone;
   if (state_ != RigState::kOff) changeState(RigState::kStopped, why);
 }

@@ -27,7 +27,11 @@ double RigMachine::seconds() const {
 void RigMachine::begin(Activity activity) {
   activity_ = activity;
   since_ns_ = tick_->time_ns;
-  setpoints_m_ = known_m_;
+  begun_m_ = known_m_;
+  for (std::size_t i = 0; i < known_m_.size(); ++i) {
+    const AxisConfig& axis = config_.axes[i].device;
+    setpoints_m_[i] = std::clamp(known_m_[i], axis.travel_min_m, axis.travel_max_m);
+  }
   if (!protocol_ && activity == Activity::kJog) origins_m_ = known_m_;
   history_N_.clear();
   history_ns_.clear();
@@ -275,6 +279,7 @@ void RigMachine::driveStep(const ProtocolStep& step) {
 }
 
 void RigMachine::actRun() {
+  const auto kept = protocol_;  // a trip lets go of it while its steps are in use
   if (tick_->time_ns >= next_capture_ns_) {
     decide("capture", nlohmann::json{{"index", captures_++}}.dump());
     next_capture_ns_ += static_cast<std::int64_t>(1e9 * protocol_->capture_interval_s);

@@ -155,6 +155,7 @@ class RigMachine {
   std::optional<double> meanTension_N(const ProtocolStep& step) const;
   double position(std::size_t axis) const;
   double highestForce_N() const;
+  bool strays(std::size_t axis) const;
   double seconds() const;
   void unloadingEnded(const std::string& left);
   void driveStep(const ProtocolStep& step);
@@ -172,6 +173,7 @@ class RigMachine {
   std::int64_t since_ns_ = 0;  ///< When the activity began.
   bool enabled_ = false, emergency_ = false, loading_ = false, recording_ = false;
   std::vector<double> setpoints_m_, origins_m_;  ///< Origins: where the run began.
+  std::vector<double> begun_m_;                  ///< Where the activity began.
   std::vector<double> known_m_;                  ///< Last positions read.
   std::vector<double> tares_N_, tare_sums_N_;
   int tare_ticks_ = 0;
