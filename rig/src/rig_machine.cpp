@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace tenter {
 namespace {
@@ -268,7 +269,7 @@ std::string RigMachine::refusalOf(const RigCommand& command) const {
     case Kind::kUnload:
       return calm || halted ? "" : no;
     case Kind::kReset:
-      return halted ? "" : no;
+      return calm || halted ? "" : no;
     case Kind::kPause:
       return activity_ == Activity::kRun && state_ == RigState::kRunning ? "" : no;
     case Kind::kResume:
@@ -371,6 +372,10 @@ void RigMachine::carryOut(const RigCommand& command) {
       begin(Activity::kRun);
       origins_m_ = known_m_;
       loading_ = recording_ = true;
+      decide("run",
+             nlohmann::json{
+                 {"protocol", protocol_->name}, {"tares_N", tares_N_}, {"origins_m", origins_m_}}
+                 .dump());
       return enterStep();
     case Kind::kPause:
       paused_since_ns_ = tick_->time_ns;
@@ -390,7 +395,7 @@ void RigMachine::carryOut(const RigCommand& command) {
     case Kind::kStop:
       return stop("operator's stop", true);
     case Kind::kReset:
-      orders_->release_halt = true;
+      orders_->energise = orders_->release_halt = true;
       return changeState(RigState::kCaution, "reset");
     case Kind::kUnload:
       if (state_ == RigState::kReady || state_ == RigState::kCaution) {
