@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -121,20 +122,24 @@ class Visit {
     }
   }
 
-  /// Out of "off": motors get current. That is this operator's own action.
+  /// Out of "off": motors get current. That is this operator's own action. Then until the cells
+  /// give tensions that may be believed; what is amiss after some seconds the daemon will say.
   Result<void> enable() {
     auto now = call("status");
     if (!now) return now.error();
-    if (now->value("state", "") != "off") return {};
-    if (auto done = call("enable"); !done) return done.error();
-    constexpr int kPatience = 25;
+    const bool was_off = now->value("state", "") == "off";
+    if (was_off) {
+      if (auto done = call("enable"); !done) return done.error();
+    }
+    constexpr int kPatience = 20;
     for (int i = 0; i < kPatience; ++i) {
+      if (now->value("state", "") != "off" && allRead(*now)) return {};
       std::this_thread::sleep_for(kPoll);
       if (auto alive = call("heartbeat"); !alive) return alive.error();
       now = call("status");
       if (!now) return now.error();
-      if (now->value("state", "") != "off") return {};
     }
+    if (now->value("state", "") != "off") return {};
     return Error{ErrorKind::kHardware, "", "", "the rig does not come up",
                  "see `tenter rig status`"};
   }
@@ -156,6 +161,12 @@ class Visit {
  private:
   Visit(std::unique_ptr<RigClient> client, Console& console)
       : client_(std::move(client)), progress_(console) {}
+
+  static bool allRead(const Json& now) {
+    const Json cells = now.value("cells", Json::array());
+    return std::all_of(cells.begin(), cells.end(),
+                       [](const Json& cell) { return cell.value("fault", "") == ""; });
+  }
 
   static std::string forces(const Json& now) {
     std::string text;

@@ -17,7 +17,7 @@ struct Client {
   std::string user;
 };
 
-/// JSON-RPC 2.0, one document a line: docs/formats/rig-rpc.md. From any thread, one call a client.
+/// JSON-RPC 2.0, one document a line: docs/rig-safety.md. From any thread, one call a client.
 class Rpc {
  public:
   explicit Rpc(RigService& service) : service_(service) {}

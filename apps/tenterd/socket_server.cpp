@@ -89,7 +89,7 @@ Result<std::unique_ptr<SocketServer>> SocketServer::listen(const fs::path& path,
   }
   const int listener = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (listener < 0) return socketError(path, "no socket");
-  const mode_t before = umask(0177);  // nobody gets in before the mode is right
+  const mode_t before = umask(0117);  // nobody gets in before listen(), and then the group is right
   const bool bound =
       bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   umask(before);

@@ -12,6 +12,10 @@ namespace {
 
 using Kind = RigCommand::Kind;
 
+/// An axis that merely answers late keeps its last reading for so long: half of what its device
+/// waits for orders before it halts by itself.
+constexpr std::int64_t kSilence_ns = 100'000'000;
+constexpr std::string_view kLateAnswer = "timeout";
 constexpr std::size_t kSlopeTicks = 5;  // a slope over one tick would be the cell's noise
 constexpr std::array<std::string_view, 7> kStateNames{"off",    "ready", "caution", "running",
                                                       "paused", "fault", "stopped"};
@@ -35,6 +39,8 @@ RigMachine::RigMachine(RigConfig config)
     : config_(std::move(config)), cap_m_per_s_(speedCap_m_per_s(config_.limits)) {
   setpoints_m_.resize(config_.axes.size());
   origins_m_.resize(config_.axes.size());
+  axes_.resize(config_.axes.size());
+  heard_ns_.resize(config_.axes.size());
   begun_m_.resize(config_.axes.size());
   known_m_.resize(config_.axes.size());
   tares_N_.resize(config_.cells.size());
@@ -63,7 +69,12 @@ void RigMachine::remember() {
   const std::int64_t passed_ns = last_ns_ ? tick_->time_ns - *last_ns_ : 0;
   dt_s_ = 1e-9 * static_cast<double>(std::clamp<std::int64_t>(passed_ns, 0, kLateTick_ns));
   for (std::size_t i = 0; i < known_m_.size(); ++i) {
-    if (tick_->axes[i].position_m) known_m_[i] = *tick_->axes[i].position_m;
+    const AxisInput& input = tick_->axes[i];
+    const bool late = !input.position_m && input.fault == kLateAnswer && heard_ns_[i] &&
+                      tick_->time_ns - *heard_ns_[i] <= kSilence_ns;
+    if (!late) axes_[i] = input;
+    if (input.position_m) heard_ns_[i] = tick_->time_ns;
+    if (axes_[i].position_m) known_m_[i] = *axes_[i].position_m;
   }
   std::vector<std::optional<double>> forces;
   for (const CellInput& cell : tick_->cells) forces.push_back(cell.gross_N);
@@ -79,7 +90,7 @@ void RigMachine::remember() {
 }
 
 bool RigMachine::axesFit() const {
-  return std::all_of(tick_->axes.begin(), tick_->axes.end(), [](const AxisInput& axis) {
+  return std::all_of(axes_.begin(), axes_.end(), [](const AxisInput& axis) {
     return axis.energised && axis.fault.empty() && axis.position_m;
   });
 }
@@ -159,7 +170,7 @@ void RigMachine::watchAxes() {
   const bool follows =
       activity_ == Activity::kJog || activity_ == Activity::kRun || activity_ == Activity::kUnload;
   for (std::size_t i = 0; i < config_.axes.size(); ++i) {
-    const AxisInput& axis = tick_->axes[i];
+    const AxisInput& axis = axes_[i];
     const std::string& name = config_.axes[i].device.name;
     const bool lost = !axis.position_m || !axis.energised || !axis.fault.empty();
     if (lost && activity_ == Activity::kUnload) continue;  // the others still unload
@@ -213,8 +224,8 @@ void RigMachine::changeState(RigState to, const std::string& reason) {
 std::string RigMachine::doubt() const {
   for (std::size_t i = 0; i < config_.axes.size(); ++i) {
     const std::string& name = config_.axes[i].device.name;
-    if (!tick_->axes[i].fault.empty()) return name + ": " + tick_->axes[i].fault;
-    if (!tick_->axes[i].position_certain) return name + ": not homed";
+    if (!axes_[i].fault.empty()) return name + ": " + axes_[i].fault;
+    if (!axes_[i].position_certain) return name + ": not homed";
   }
   for (std::size_t i = 0; i < config_.cells.size(); ++i) {
     const CellInput& cell = tick_->cells[i];
@@ -233,7 +244,7 @@ void RigMachine::settleIdleState() {
   recording_ = false;
   if (state_ == RigState::kOff || state_ == RigState::kFault || state_ == RigState::kStopped)
     return;
-  const bool off = std::any_of(tick_->axes.begin(), tick_->axes.end(),
+  const bool off = std::any_of(axes_.begin(), axes_.end(),
                                [](const AxisInput& axis) { return !axis.energised; });
   if (off) {
     enabled_ = false;
@@ -308,7 +319,7 @@ std::string RigMachine::refusalOfJog(const RigCommand& command) const {
     return "the speed must be above 0 and at most " + std::to_string(axis.max_speed_m_per_s) +
            " m/s";
   }
-  if (!tick_->axes[index].position_m || !tick_->axes[index].energised) {
+  if (!axes_[index].position_m || !axes_[index].energised) {
     return "axis " + axis.name + " does not answer or has no current";
   }
   const double target_m = known_m_[index] + command.distance_m;

@@ -104,7 +104,7 @@ void RigMachine::actJog() {
 
 void RigMachine::actHome() {
   if (seconds() < kHomeFirst_s) return;
-  const bool done = std::all_of(tick_->axes.begin(), tick_->axes.end(), [](const AxisInput& axis) {
+  const bool done = std::all_of(axes_.begin(), axes_.end(), [](const AxisInput& axis) {
     return !axis.homing && axis.position_certain;
   });
   if (done) {
@@ -156,7 +156,7 @@ void RigMachine::actUnload() {
     const auto tension_N = net_N(static_cast<std::size_t>(*axis.cell));
     if (tension_N ? *tension_N <= config_.limits.slack_N : setpoints_m_[i] <= origins_m_[i])
       continue;
-    const AxisInput& input = tick_->axes[i];
+    const AxisInput& input = axes_[i];
     if (!input.energised || !input.fault.empty() || !input.position_m) {
       left += (left.empty() ? "" : ", ") + axis.device.name + " does not move";
     } else if (setpoints_m_[i] <= axis.device.travel_min_m) {

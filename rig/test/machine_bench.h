@@ -86,7 +86,9 @@ class MachineBench {
         const double most_m = 1.5 * kMaxSpeed_m_per_s * kTick_s;
         position_m[i] += std::clamp(goal_m[i] - position_m[i], -most_m, most_m);
       }
-      tick.axes[i].position_m = position_m[i];
+      const bool mute = mute_axis == static_cast<int>(i);
+      tick.axes[i].position_m = mute ? std::nullopt : std::optional(position_m[i]);
+      if (mute_axis >= 0) tick.axes[i].fault = mute ? "timeout" : "";
     }
     for (std::size_t i = 0; i < tick.cells.size(); ++i) {
       const bool stale = stale_cell == static_cast<int>(i);
@@ -173,7 +175,7 @@ class MachineBench {
   std::vector<RecordBody> records;
   std::vector<double> position_m, goal_m;
   double extra_N = 0.0;
-  int stuck = -1, stale_cell = -1;
+  int stuck = -1, stale_cell = -1, mute_axis = -1;
 
  private:
   std::uint64_t last_id_ = 0;

@@ -133,6 +133,19 @@ TEST(RigMachineTest, AnAxisThatDoesNotFollowIsAFaultAndWhatRemainsIsSaid) {
   EXPECT_EQ(bench.countOf("not-unloaded"), 1);
 }
 
+TEST(RigMachineTest, AnAxisMayAnswerLateButNotForLong) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(1.0));
+  bench.mute_axis = 1;
+  bench.steps(5);  // 100 ms
+  EXPECT_EQ(bench.machine.state(), RigState::kRunning);
+  bench.step();
+  EXPECT_TRUE(bench.orders.halt);
+  EXPECT_EQ(bench.machine.reason(), "axis-2: timeout");
+}
+
 TEST(RigMachineTest, ForceSlopeIsBounded) {
   MachineBench bench;
   bench.enable();

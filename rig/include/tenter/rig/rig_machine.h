@@ -168,6 +168,8 @@ class RigMachine {
   Activity activity_ = Activity::kNone;
   const RigTick* tick_ = nullptr;  ///< While in step().
   RigOrders* orders_ = nullptr;
+  std::vector<AxisInput> axes_;  ///< The last readings that count.
+  std::vector<std::optional<std::int64_t>> heard_ns_;
   std::optional<std::int64_t> last_ns_;
   double dt_s_ = 0.0;
   std::int64_t since_ns_ = 0;  ///< When the activity began.
