@@ -29,6 +29,7 @@ pkg_check_modules(hdf5 REQUIRED IMPORTED_TARGET GLOBAL hdf5-serial)
 if(TENTER_HARDWARE)
   pkg_check_modules(libusb REQUIRED IMPORTED_TARGET GLOBAL libusb-1.0>=1.0.26)
   pkg_check_modules(umockdev REQUIRED IMPORTED_TARGET GLOBAL umockdev-1.0>=0.17 gobject-2.0)
+  pkg_check_modules(libsystemd REQUIRED IMPORTED_TARGET GLOBAL libsystemd)
   pkg_check_modules(libmodbus REQUIRED IMPORTED_TARGET GLOBAL libmodbus>=3.1.6)
 endif()
 

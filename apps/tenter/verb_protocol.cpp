@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
 
+#include "protocol_files.h"
 #include "tenter/twin/protocol.h"
 #include "verbs.h"
 
@@ -28,7 +29,10 @@ Result<int> list(const Options& /*options*/, Console& console) {
 }  // namespace
 
 Verb protocolVerb() {
-  static constexpr std::array kRows = {
+  static const std::array kRows = {
+#ifdef TENTER_HARDWARE
+      protocolShow(), protocolCheck(),
+#endif
       Verb{"list", "Names of the capture protocols",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declare, list); }}};
   return {"protocol", "Capture protocols", [](CLI::App& command, Action& action) {

@@ -113,7 +113,10 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
 }  // namespace
 
 Verb twinVerb() {
-  static constexpr std::array kRows = {
+  static const std::array kRows = {
+#ifdef TENTER_HARDWARE
+      twinServe(),
+#endif
       Verb{"fabrics", "Names of the virtual fabrics",
            [](CLI::App& c, Action& a) {
              setUpCommand<NoOptions>(c, a, declareNothing, listFabrics);

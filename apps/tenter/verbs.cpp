@@ -9,6 +9,9 @@ std::span<const Verb> verbs() {
   static const std::array kVerbs = {
       importVerb(), fitVerb(),      evaluateVerb(), materialVerb(), exportVerb(),  drapeVerb(),
       twinVerb(),   protocolVerb(), sessionVerb(),  demoVerb(),     versionVerb(),
+#ifdef TENTER_HARDWARE
+      rigVerb(),
+#endif
   };
   return kVerbs;
 }

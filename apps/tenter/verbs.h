@@ -15,8 +15,12 @@ Verb drapeVerb();
 Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();
+Verb rigVerb();
 Verb demoVerb();
 Verb versionVerb();
+
+// Rows of `tenter twin` that need devices, twin_<name>.cpp.
+Verb twinServe();
 
 // Kinds of import, one file each, import_<name>.cpp.
 Verb tensileImport();

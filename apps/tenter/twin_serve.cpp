@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <iterator>
+#include <thread>
+
+#include "interrupt.h"
+#include "tenter/twin/served_rig.h"
+#include "verbs.h"
+
+namespace tenter::app {
+
+namespace {
+
+struct Options {
+  ServedRigOptions rig;
+  std::string state, modbus = "tcp";
+};
+
+void declare(CLI::App& command, Options& o) {
+  command.add_option("--fabric", o.rig.fabric, "One of `tenter twin fabrics`")->required();
+  command.add_option("--state", o.state, "Folder for rig.toml")->required();
+  command.add_option("--modbus", o.modbus, "How the load cells are reached")
+      ->check(CLI::IsMember({"tcp", "rtu"}))
+      ->capture_default_str();
+  command.add_option("--seed", o.rig.seed, "Of the cells' noise")->capture_default_str();
+}
+
+/// The program anew, with what it takes to announce devices.
+Result<void> preload() {
+  std::ifstream file("/proc/self/cmdline", std::ios::binary);
+  std::string all((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  std::vector<char*> arguments;
+  for (auto at = all.begin(); at != all.end(); at = std::next(std::find(at, all.end(), '\0'))) {
+    arguments.push_back(&*at);
+  }
+  arguments.push_back(nullptr);
+  return VirtualUsb::preload(arguments.data());
+}
+
+std::string quoted(const std::string& text) { return "'" + text + "'"; }
+
+Result<int> serve(const Options& o, Console& console) {
+  if (auto ready = preload(); !ready) return ready.error();
+  ServedRigOptions options = o.rig;
+  options.state = o.state;
+  options.tcp = o.modbus == "tcp";
+  const auto rig = ServedRig::start(options);
+  if (!rig) return rig.error();
+  std::string command = "env";
+  for (const std::string& variable : (*rig)->usb().environment()) command += " " + quoted(variable);
+  const std::string config = (*rig)->configFile().string();
+  const std::string socket = (*rig)->configFile().replace_filename("tenterd.sock").string();
+  command += " tenterd --config " + quoted(config) + " --socket " + quoted(socket);
+  // At once and flushed: whoever starts the daemon reads it while this program serves.
+  std::printf("%s\n", console.json ? nlohmann::json{{"tenterd", command},
+                                                    {"config", config},
+                                                    {"socket", socket},
+                                                    {"environment", (*rig)->usb().environment()}}
+                                         .dump()
+                                         .c_str()
+                                   : command.c_str());
+  std::fflush(stdout);
+  while (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  console.answer["served"] = o.rig.fabric;
+  return kDone;
+}
+
+}  // namespace
+
+Verb twinServe() {
+  return {"serve", "Serve a virtual rig behind the devices' protocols until Ctrl-C",
+          [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declare, serve); }};
+}
+
+}  // namespace tenter::app

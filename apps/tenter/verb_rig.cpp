@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <thread>
+
+#include "interrupt.h"
+#include "progress.h"
+#include "rig_client.h"
+#include "tenter/core/files.h"
+#include "tenter/rig/protocol.h"
+#include "tenter/rig/shipped_files.h"
+#include "verbs.h"
+
+namespace tenter::app {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr auto kPoll = std::chrono::milliseconds(200);
+constexpr double kMillimetre_m = 1e-3;
+constexpr int kInterlock = static_cast<int>(ErrorKind::kInterlock);
+
+struct Options {
+  const CLI::Option* socket = nullptr;  ///< Of `tenter rig`, before or behind the verb.
+  std::string axis;
+  double by_mm = 0.0, speed_mm_per_s = 1.0;
+  std::string protocol, output, fabric = "unknown", specimen = "unknown", who = "unknown",
+                                operator_name = "unknown";
+  double areal_density_kg_per_m2 = 0.2;
+};
+
+void declareSocket(CLI::App& command, Options& o) {
+  o.socket = command.get_parent()->get_option("--socket");
+}
+
+void declareJog(CLI::App& command, Options& o) {
+  declareSocket(command, o);
+  command.add_option("axis", o.axis, "Name of the axis")->required();
+  command.add_option("--by-mm", o.by_mm, "How far; positive loads the sample")->required();
+  command.add_option("--speed-mm-per-s", o.speed_mm_per_s, "How fast")->capture_default_str();
+}
+
+void declareRun(CLI::App& command, Options& o) {
+  declareSocket(command, o);
+  command.add_option("protocol", o.protocol, "A shipped protocol, or a TOML file")->required();
+  command.add_option("-o,--output", o.output, "Folder of the session")->required();
+  command.add_option("--fabric", o.fabric, "For the session's record")->capture_default_str();
+  command.add_option("--specimen", o.specimen, "Which piece of the fabric")->capture_default_str();
+  command.add_option("--who", o.who, "Whom the data belong to")->capture_default_str();
+  command.add_option("--operator", o.operator_name, "Who is at the bench")->capture_default_str();
+  command.add_option("--areal-density", o.areal_density_kg_per_m2, "kg/m2")->capture_default_str();
+}
+
+std::string numberText(const Json& value, const char* unit) {
+  if (!value.is_number()) return std::string("- ") + unit;
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4f %s", value.get<double>(), unit);
+  return text;
+}
+
+Result<int> status(const Options& o, Console& console) {
+  const auto client = RigClient::connect(o.socket->as<std::string>());
+  if (!client) return client.error();
+  const auto answer = (*client)->call("status");
+  if (!answer) return answer.error();
+  console.answer = *answer;
+  const std::string reason = answer->value("reason", "");
+  console.say(answer->value("rig", "") + ": " + answer->value("state", "") +
+              (reason.empty() ? "" : " (" + reason + ")"));
+  for (const Json& axis : answer->value("axes", Json::array())) {
+    console.say("  " + axis.value("name", "") + "  " +
+                numberText(axis.value("position_m", Json()), "m") + "  " + axis.value("fault", ""));
+  }
+  for (const Json& cell : answer->value("cells", Json::array())) {
+    console.say("  " + cell.value("name", "") + "  " +
+                numberText(cell.value("net_N", Json()), "N") + "  " + cell.value("fault", ""));
+  }
+  return kDone;
+}
+
+Result<int> stop(const Options& o, Console& console) {
+  const auto client = RigClient::connect(o.socket->as<std::string>());
+  if (!client) return client.error();
+  const auto answer = (*client)->call("stop");
+  if (!answer) return answer.error();
+  console.answer = *answer;
+  console.say("all axes halted");
+  return kDone;
+}
+
+/// One operator's visit: holds the lease while it lasts.
+class Visit {
+ public:
+  static Result<std::unique_ptr<Visit>> begin(const Options& o, Console& console) {
+    auto client = RigClient::connect(o.socket->as<std::string>());
+    if (!client) return client.error();
+    if (auto lease = (*client)->call("lease"); !lease) return lease.error();
+    return std::unique_ptr<Visit>(new Visit(*std::move(client), console));
+  }
+
+  Result<Json> call(const std::string& method, const Json& params = Json::object()) {
+    return client_->call(method, params);
+  }
+
+  /// Until the rig rests; Ctrl-C aborts, and then it unloads. The last status.
+  Result<Json> wait(const std::string& what) {
+    for (bool aborted = false;;) {
+      std::this_thread::sleep_for(kPoll);
+      if (auto alive = call("heartbeat"); !alive) return alive.error();
+      auto now = call("status");
+      if (!now) return now.error();
+      if (interrupted() && !aborted) {
+        aborted = true;
+        (void)call("abort");  // refused where there is nothing to abort
+      }
+      progress_.show(-1.0, what + ", " + now->value("state", "") + forces(*now));
+      if (!now->value("moving", false) && now->value("state", "") != "paused") return now;
+    }
+  }
+
+  /// Out of "off": motors get current. That is this operator's own action. Then until the cells
+  /// give tensions that may be believed; what is amiss after some seconds the daemon will say.
+  Result<void> enable() {
+    auto now = call("status");
+    if (!now) return now.error();
+    const bool was_off = now->value("state", "") == "off";
+    if (was_off) {
+      if (auto done = call("enable"); !done) return done.error();
+    }
+    constexpr int kPatience = 20;
+    for (int i = 0; i < kPatience; ++i) {
+      if (now->value("state", "") != "off" && allRead(*now)) return {};
+      std::this_thread::sleep_for(kPoll);
+      if (auto alive = call("heartbeat"); !alive) return alive.error();
+      now = call("status");
+      if (!now) return now.error();
+    }
+    if (now->value("state", "") != "off") return {};
+    return Error{ErrorKind::kHardware, "", "", "the rig does not come up",
+                 "see `tenter rig status`"};
+  }
+
+  Result<void> homeIfLost() {
+    const auto now = call("status");
+    if (!now) return now.error();
+    bool lost = false;
+    for (const Json& axis : now->value("axes", Json::array())) {
+      lost = lost || !axis.value("homed", false);
+    }
+    if (!lost) return {};
+    if (auto done = call("home"); !done) return done.error();
+    const auto after = wait("homing");
+    if (!after) return after.error();
+    return {};
+  }
+
+ private:
+  Visit(std::unique_ptr<RigClient> client, Console& console)
+      : client_(std::move(client)), progress_(console) {}
+
+  static bool allRead(const Json& now) {
+    const Json cells = now.value("cells", Json::array());
+    return std::all_of(cells.begin(), cells.end(),
+                       [](const Json& cell) { return cell.value("fault", "") == ""; });
+  }
+
+  static std::string forces(const Json& now) {
+    std::string text;
+    for (const Json& cell : now.value("cells", Json::array())) {
+      const Json force = cell.value("net_N", Json());
+      char number[16] = "     -";
+      if (force.is_number()) std::snprintf(number, sizeof number, " %5.2f", force.get<double>());
+      text += number;
+    }
+    return text + " N";
+  }
+
+  std::unique_ptr<RigClient> client_;
+  Progress progress_;
+};
+
+/// What the visit ended in: exit 7 if a limit or a person ended the motion.
+Result<int> ended(const Json& status, Console& console) {
+  const std::string state = status.value("state", "");
+  const std::string reason = status.value("reason", "");
+  console.answer["state"] = state;
+  console.answer["reason"] = reason;
+  console.say("the rig is " + state + (reason.empty() ? "" : " (" + reason + ")"));
+  return state == "fault" || state == "stopped" || interrupted() ? kInterlock : kDone;
+}
+
+Result<int> giveAndWait(const Options& o, Console& console, const std::string& method,
+                        const Json& params = Json::object()) {
+  const auto visit = Visit::begin(o, console);
+  if (!visit) return visit.error();
+  const bool needs_current = method != "disable";
+  if (needs_current) {
+    if (auto up = (*visit)->enable(); !up) return up.error();
+  }
+  if (method != "enable") {
+    if (auto done = (*visit)->call(method, params); !done) return done.error();
+  }
+  const auto status = (*visit)->wait(method);
+  if (!status) return status.error();
+  return ended(*status, console);
+}
+
+Result<int> jog(const Options& o, Console& console) {
+  return giveAndWait(o, console, "jog",
+                     {{"axis", o.axis},
+                      {"distance_m", o.by_mm * kMillimetre_m},
+                      {"speed_m_per_s", o.speed_mm_per_s * kMillimetre_m}});
+}
+
+Result<std::string> protocolText(const std::string& name) {
+  if (const ShippedFile* file = findShippedFile(shippedProtocols(), name)) {
+    return std::string(file->text);
+  }
+  const auto protocol = readCaptureProtocol(name);
+  if (!protocol) return protocol.error();
+  return protocol->text;
+}
+
+Result<int> run(const Options& o, Console& console) {
+  const auto text = protocolText(o.protocol);
+  if (!text) return text.error();
+  const auto visit = Visit::begin(o, console);
+  if (!visit) return visit.error();
+  if (auto up = (*visit)->enable(); !up) return up.error();
+  if (auto homed = (*visit)->homeIfLost(); !homed) return homed.error();
+  const auto started = (*visit)->call(
+      "run", {{"protocol", *text},
+              {"session", std::filesystem::absolute(o.output).lexically_normal().string()},
+              {"fabric", o.fabric},
+              {"specimen", o.specimen},
+              {"who", o.who},
+              {"operator", o.operator_name},
+              {"areal_density_kg_per_m2", o.areal_density_kg_per_m2}});
+  if (!started) return started.error();
+  auto status = (*visit)->wait(o.protocol);
+  if (!status) return status.error();
+  constexpr int kPatience = 25;
+  for (int i = 0; i < kPatience && !status->at("session").value("closed", false); ++i) {
+    std::this_thread::sleep_for(kPoll);
+    status = (*visit)->call("status");
+    if (!status) return status.error();
+  }
+  console.answer["session"] = o.output;
+  const std::string fault = status->at("session").value("fault", "");
+  if (!fault.empty()) return Error{ErrorKind::kHardware, o.output, "", fault, ""};
+  return ended(*status, console);
+}
+
+template <const char* kMethod>
+Result<int> plain(const Options& o, Console& console) {
+  return giveAndWait(o, console, kMethod);
+}
+
+constexpr char kEnable[] = "enable", kDisable[] = "disable", kHome[] = "home", kTare[] = "tare",
+               kUnload[] = "unload", kReset[] = "reset";
+
+template <const char* kMethod>
+void setUpPlain(CLI::App& command, Action& action) {
+  setUpCommand<Options>(command, action, declareSocket, plain<kMethod>);
+}
+
+}  // namespace
+
+Verb rigVerb() {
+  static constexpr std::array kRows = {
+      Verb{"status", "State, positions and tensions",
+           [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSocket, status); }},
+      Verb{"stop", "Halt all axes at once; anybody may",
+           [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSocket, stop); }},
+      Verb{"enable", "Give the motors current", setUpPlain<kEnable>},
+      Verb{"disable", "Take the motors' current away", setUpPlain<kDisable>},
+      Verb{"home", "Find the ends of all axes", setUpPlain<kHome>},
+      Verb{"tare", "Take the tensions of now for zero", setUpPlain<kTare>},
+      Verb{"unload", "Let all cords out until they are slack", setUpPlain<kUnload>},
+      Verb{"reset", "Leave a fault or a stop behind", setUpPlain<kReset>},
+      Verb{"jog", "Move one axis",
+           [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareJog, jog); }},
+      Verb{"run", "Run a protocol and record the session; homes first if it must",
+           [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareRun, run); }}};
+  return {"rig", "The rig, through tenterd", [](CLI::App& command, Action& action) {
+            command.require_subcommand(1);
+            command.add_option("--socket", "Socket of tenterd")->required();
+            addSubcommands(command, kRows, action);
+          }};
+}
+
+}  // namespace tenter::app

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <string>
+
+namespace tenter::daemon {
+
+/// One operator at a time: whoever holds the lease, and renews it, may move the rig. Times are
+/// CLOCK_MONOTONIC. From any thread.
+class Lease {
+ public:
+  static constexpr std::int64_t kLength_ns = 2'000'000'000;
+
+  /// For the client of that connection; false while another one holds it.
+  bool acquire(std::uint64_t connection, const std::string& who, std::int64_t now_ns);
+  /// False if that connection does not hold it (any more).
+  bool renew(std::uint64_t connection, std::int64_t now_ns);
+  void release(std::uint64_t connection);
+  bool heldBy(std::uint64_t connection, std::int64_t now_ns) const;
+  bool held(std::int64_t now_ns) const;
+  std::string holder(std::int64_t now_ns) const;  ///< Empty if nobody.
+
+ private:
+  mutable std::mutex mutex_;
+  std::uint64_t connection_ = 0;  ///< 0: nobody.
+  std::string who_;
+  std::int64_t until_ns_ = 0;
+};
+
+}  // namespace tenter::daemon

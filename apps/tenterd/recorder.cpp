@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "recorder.h"
+
+#include <algorithm>
+
+#include "tenter/rig/load_cell.h"
+
+namespace tenter::daemon {
+namespace {
+
+/// A disk that is so far behind will not catch up; 200 s of samples.
+constexpr std::size_t kLongestQueue = 10'000;
+
+}  // namespace
+
+Recorder::Recorder(std::unique_ptr<SessionWriter> writer, std::int64_t start_ns)
+    : writer_(std::move(writer)), start_ns_(start_ns), thread_([this] { write(); }) {}
+
+Recorder::~Recorder() {
+  close(monotonic_ns());
+  thread_.join();
+}
+
+void Recorder::append(std::int64_t time_ns, RecordBody body) {
+  const std::lock_guard lock(mutex_);
+  if (close_ns_ >= 0) return;
+  if (queue_.size() >= kLongestQueue) {
+    if (fault_.empty()) fault_ = "the disk does not keep up";
+    return;
+  }
+  queue_.push_back({std::max<std::int64_t>(0, time_ns - start_ns_), std::move(body)});
+  changed_.notify_one();
+}
+
+void Recorder::close(std::int64_t time_ns) {
+  const std::lock_guard lock(mutex_);
+  if (close_ns_ < 0) close_ns_ = std::max<std::int64_t>(0, time_ns - start_ns_);
+  changed_.notify_one();
+}
+
+bool Recorder::closed() const {
+  const std::lock_guard lock(mutex_);
+  return closed_;
+}
+
+std::string Recorder::fault() const {
+  const std::lock_guard lock(mutex_);
+  return fault_;
+}
+
+std::string Recorder::folder() const { return writer_->folder().string(); }
+
+void Recorder::take(std::deque<Item> items) {
+  for (const Item& item : items) {
+    const auto written = writer_->append(item.time_ns, item.body);
+    if (written) continue;
+    const std::lock_guard lock(mutex_);
+    if (fault_.empty()) fault_ = written.error().message();
+  }
+}
+
+void Recorder::write() {
+  for (;;) {
+    std::deque<Item> items;
+    bool last = false;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return !queue_.empty() || close_ns_ >= 0; });
+      items.swap(queue_);
+      last = close_ns_ >= 0;
+    }
+    take(std::move(items));
+    if (!last) continue;
+    const Result<void> done = writer_->close(close_ns_);
+    const std::lock_guard lock(mutex_);
+    if (!done && fault_.empty()) fault_ = done.error().message();
+    closed_ = true;
+    return;
+  }
+}
+
+}  // namespace tenter::daemon

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "lease.h"
+#include "rig_service.h"
+
+namespace tenter::daemon {
+
+/// Who speaks on a connection.
+struct Client {
+  std::uint64_t connection = 0;
+  std::string user;
+};
+
+/// JSON-RPC 2.0, one document a line: docs/rig-safety.md. From any thread, one call a client.
+class Rpc {
+ public:
+  explicit Rpc(RigService& service) : service_(service) {}
+
+  /// The answer's line without its end; empty for a notification. Whatever the line holds.
+  std::string answer(std::string_view line, const Client& client);
+  void clientGone(const Client& client);
+  /// To be called in every tick: tells the service whether somebody holds the rig.
+  void tick();
+
+ private:
+  Result<nlohmann::json> status() const;
+  Result<nlohmann::json> run(const nlohmann::json& params);
+  Result<nlohmann::json> jog(const nlohmann::json& params);
+  Result<nlohmann::json> plain(RigCommand::Kind kind);
+  Result<nlohmann::json> dispatch(const std::string& method, const nlohmann::json& params,
+                                  const Client& client);
+
+  RigService& service_;
+  Lease lease_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<Recorder> recorder_;  ///< Of the last run.
+};
+
+}  // namespace tenter::daemon
