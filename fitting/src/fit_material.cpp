@@ -38,12 +38,24 @@ Result<void> checkTogether(const std::vector<Measurement>& measurements) {
   return {};
 }
 
+/// The frames that a test is judged by: all; of a fit that was stopped only the few that brought
+/// the tests to its point, since others may take minutes with parameters that are half fitted.
+std::vector<FramePrediction> judgedFrames(const FrameEvaluator& evaluator, int test,
+                                          bool cancelled) {
+  if (!cancelled) return predictFrames(*evaluator.tests()[test], false, evaluator.threads());
+  std::vector<FramePrediction> frames;
+  for (const FrameId& id : evaluator.frames())
+    if (id.test == test) frames.push_back(evaluator.tests()[test]->predict(id.frame, false));
+  return frames;
+}
+
 /// Residuals and shapes of every test with the final parameters.
 void judgeTests(FitRun& run, const FitStatistics* statistics, FitResult& result) {
   const std::vector<FitTest*>& tests = run.evaluator().tests();
   const int threads = run.evaluator().threads();
   for (std::size_t t = 0; t < tests.size(); ++t) {
-    TestResidual residual = summarizeTest(*tests[t], predictFrames(*tests[t], false, threads));
+    TestResidual residual = summarizeTest(
+        *tests[t], judgedFrames(run.evaluator(), static_cast<int>(t), result.cancelled));
     if (statistics) residual.chi2_per_dof = statistics->tests[t].chi2_per_dof;
     if (!result.cancelled) residual.multistable_frames = countMultistable(*tests[t], threads);
     if (residual.unconverged_frames > 0)
@@ -128,6 +140,8 @@ Result<FitResult> fitWithTests(const std::vector<Measurement>& measurements,
   // happens.
   result.cancelled = run.evaluator().cancelled();
   run.evaluator().ignoreCancelling();
+  if (result.cancelled && !run.last().usable)
+    return notConverged("stopped before anything was fitted; nothing was written");
   if (!ran && !run.last().usable)
     return notConverged("no frame of any measurement has a stable equilibrium near the first guess",
                         "check units, clips and areal density of the measurements");
