@@ -183,14 +183,17 @@ class Visit {
   Progress progress_;
 };
 
-/// What the visit ended in: exit 7 if a limit or a person ended the motion.
-Result<int> ended(const Json& status, Console& console) {
+/// What the visit ended in: exit 7 if a limit or a person ended the motion, not if the rig is as
+/// halted as it was before.
+Result<int> ended(const Json& before, const Json& status, Console& console) {
   const std::string state = status.value("state", "");
   const std::string reason = status.value("reason", "");
   console.answer["state"] = state;
   console.answer["reason"] = reason;
   console.say("the rig is " + state + (reason.empty() ? "" : " (" + reason + ")"));
-  return state == "fault" || state == "stopped" || interrupted() ? kInterlock : kDone;
+  const bool as_before = before.value("state", "") == state && before.value("reason", "") == reason;
+  const bool halted = (state == "fault" || state == "stopped") && !as_before;
+  return halted || interrupted() ? kInterlock : kDone;
 }
 
 Result<int> giveAndWait(const Options& o, Console& console, const std::string& method,
@@ -201,12 +204,14 @@ Result<int> giveAndWait(const Options& o, Console& console, const std::string& m
   if (needs_current) {
     if (auto up = (*visit)->enable(); !up) return up.error();
   }
+  const auto before = (*visit)->call("status");
+  if (!before) return before.error();
   if (method != "enable") {
     if (auto done = (*visit)->call(method, params); !done) return done.error();
   }
   const auto status = (*visit)->wait(method);
   if (!status) return status.error();
-  return ended(*status, console);
+  return ended(*before, *status, console);
 }
 
 Result<int> jog(const Options& o, Console& console) {
@@ -252,7 +257,7 @@ Result<int> run(const Options& o, Console& console) {
   console.answer["session"] = o.output;
   const std::string fault = status->at("session").value("fault", "");
   if (!fault.empty()) return Error{ErrorKind::kHardware, o.output, "", fault, ""};
-  return ended(*status, console);
+  return ended(Json::object(), *status, console);
 }
 
 template <const char* kMethod>

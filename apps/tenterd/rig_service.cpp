@@ -11,7 +11,7 @@ using Kind = RigCommand::Kind;
 
 constexpr auto kTick = 20ms;
 constexpr auto kWatchPeriod = 2ms;
-constexpr Actuator::Timeout kDeviceTimeout{20}, kEnergiseTimeout{100}, kConnectTimeout{500};
+constexpr Actuator::Timeout kDeviceTimeout{40}, kEnergiseTimeout{100}, kConnectTimeout{500};
 constexpr auto kAnswerLimit = 2s;
 constexpr auto kQuitLimit = 30s;
 constexpr std::int64_t kReconnectPeriod_ns = 1'000'000'000;
@@ -54,6 +54,10 @@ RigService::RigService(RigConfig config, ActuatorBank bank,
       bank_(std::move(bank)),
       scanner_(std::move(scanner)),
       machine_(std::move(config)),
+      status_{{"rig", config_.name},
+              {"state", rigStateName(machine_.state())},
+              {"reason", "has not been read yet"},
+              {"moving", false}},
       watch_([this] { watch(); }) {}
 
 RigService::~RigService() {

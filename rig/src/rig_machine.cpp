@@ -15,7 +15,9 @@ using Kind = RigCommand::Kind;
 /// An axis that merely answers late keeps its last reading for so long: half of what its device
 /// waits for orders before it halts by itself.
 constexpr std::int64_t kSilence_ns = 100'000'000;
-constexpr std::string_view kLateAnswer = "timeout";
+/// A question that a halt cut short is as good as one that was answered late.
+bool isLate(std::string_view fault) { return fault == "timeout" || fault == "preempted"; }
+
 constexpr std::size_t kSlopeTicks = 5;  // a slope over one tick would be the cell's noise
 constexpr std::array<std::string_view, 7> kStateNames{"off",    "ready", "caution", "running",
                                                       "paused", "fault", "stopped"};
@@ -41,6 +43,7 @@ RigMachine::RigMachine(RigConfig config)
   origins_m_.resize(config_.axes.size());
   axes_.resize(config_.axes.size());
   heard_ns_.resize(config_.axes.size());
+  felt_ns_.resize(config_.cells.size());
   begun_m_.resize(config_.axes.size());
   known_m_.resize(config_.axes.size());
   tares_N_.resize(config_.cells.size());
@@ -70,11 +73,15 @@ void RigMachine::remember() {
   dt_s_ = 1e-9 * static_cast<double>(std::clamp<std::int64_t>(passed_ns, 0, kLateTick_ns));
   for (std::size_t i = 0; i < known_m_.size(); ++i) {
     const AxisInput& input = tick_->axes[i];
-    const bool late = !input.position_m && input.fault == kLateAnswer && heard_ns_[i] &&
+    const bool late = !input.position_m && isLate(input.fault) && heard_ns_[i] &&
                       tick_->time_ns - *heard_ns_[i] <= kSilence_ns;
     if (!late) axes_[i] = input;
     if (input.position_m) heard_ns_[i] = tick_->time_ns;
     if (axes_[i].position_m) known_m_[i] = *axes_[i].position_m;
+  }
+  for (std::size_t i = 0; i < felt_ns_.size(); ++i) {
+    const CellInput& cell = tick_->cells[i];
+    if (cell.gross_N && cell.age_ns <= kStale_ns) felt_ns_[i] = tick_->time_ns;
   }
   std::vector<std::optional<double>> forces;
   for (const CellInput& cell : tick_->cells) forces.push_back(cell.gross_N);
@@ -134,12 +141,15 @@ void RigMachine::watchForces() {
 
 /// Of motions that may raise a tension.
 void RigMachine::watchLoading() {
+  blind_ = false;
   if (!loading_) return;
   const double span_s = 1e-9 * static_cast<double>(history_ns_.back() - history_ns_.front());
   for (std::size_t i = 0; i < config_.cells.size(); ++i) {
     const CellInput& cell = tick_->cells[i];
     const std::string& name = config_.cells[i].id;
     if (!cell.gross_N || cell.age_ns > kStale_ns) {
+      blind_ = true;
+      if (tick_->time_ns - felt_ns_[i] <= kSilence_ns) continue;
       return trip(name, cell.fault.empty() ? "stale" : cell.fault, "no tension to go by");
     }
     if (*cell.gross_N > config_.limits.working_N) {
@@ -190,7 +200,7 @@ void RigMachine::trip(const std::string& source, const std::string& fault,
   orders_->records.emplace_back(FaultEvent{source, fault, text});
   if (state_ == RigState::kFault) {
     if (activity_ == Activity::kUnload) unloadingEnded(source + ": " + fault);
-    activity_ = Activity::kNone;
+    if (activity_ != Activity::kSettle) activity_ = Activity::kNone;  // what settles still unloads
     return;
   }
   const bool was_moving = activity_ != Activity::kNone && activity_ != Activity::kTare;

@@ -69,7 +69,7 @@ void RigMachine::move(const std::vector<double>& velocities_m_per_s) {
 }
 
 void RigMachine::act() {
-  if (state_ == RigState::kPaused) return;
+  if (state_ == RigState::kPaused || (loading_ && blind_)) return;
   switch (activity_) {
     case Activity::kNone:
       return;
@@ -180,9 +180,7 @@ void RigMachine::actUnload() {
 void RigMachine::unloadingEnded(const std::string& left) {
   if (left.empty()) return decide("unloaded");
   decide("not-unloaded", nlohmann::json{{"why", left}}.dump());
-  if (state_ != RigState::kFault && state_ != RigState::kStopped) {
-    changeState(RigState::kFault, "not unloaded: " + left);
-  }
+  changeState(RigState::kFault, "not unloaded: " + left);
 }
 
 std::optional<double> RigMachine::meanTension_N(const ProtocolStep& step) const {

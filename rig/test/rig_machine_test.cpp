@@ -101,6 +101,11 @@ TEST(RigMachineTest, AStaleCellStopsMotionAndUnloadsByTheOthersAndByPosition) {
   bench.run();
   ASSERT_TRUE(bench.loadUpTo(2.0));
   bench.stale_cell = 0;
+  for (int i = 0; i < 5; ++i) {  // 100 ms
+    bench.step();
+    EXPECT_THAT(bench.orders.targets_m, testing::Each(std::nullopt));
+    EXPECT_FALSE(bench.orders.halt);
+  }
   bench.step();
   EXPECT_TRUE(bench.orders.halt);
   EXPECT_TRUE(bench.hasFault("silence"));
@@ -110,12 +115,40 @@ TEST(RigMachineTest, AStaleCellStopsMotionAndUnloadsByTheOthersAndByPosition) {
   EXPECT_LE(bench.position_m[0], 0.01 + 1e-9);
 }
 
+TEST(RigMachineTest, ACellThatIsBackInTimeLetsTheRunGoOn) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(1.0));
+  bench.stale_cell = 0;
+  bench.steps(3);
+  bench.stale_cell = -1;
+  ASSERT_TRUE(bench.reach(RigState::kReady));
+  EXPECT_EQ(bench.countOf("step"), 6);
+}
+
+TEST(RigMachineTest, ASecondFaultBesideTheFirstDoesNotKeepTheOthersLoaded) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(2.0));
+  bench.tick.trip = ForceTrip{0, 7.0};
+  bench.tick.axes[1].fault = "stall";
+  bench.step();
+  bench.step();
+  bench.tick.axes[1].fault.clear();
+  bench.steps(500);
+  EXPECT_EQ(bench.countOf("unloaded"), 1);
+}
+
 TEST(RigMachineTest, AnOldSampleIsStale) {
   MachineBench bench;
   bench.enable();
   bench.run();
   bench.tick.cells[1].age_ns = RigMachine::kStale_ns + 1;
   bench.step();
+  EXPECT_THAT(bench.orders.targets_m, testing::Each(std::nullopt));
+  bench.steps(5);
   EXPECT_TRUE(bench.orders.halt);
   EXPECT_TRUE(bench.hasFault("stale"));
 }

@@ -5,8 +5,10 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 
 #include "running_rig.h"
 #include "tenter/session/replay.h"
@@ -56,26 +58,43 @@ std::string logOf(const std::string& session) {
   return log.text();
 }
 
-bool allMove(RunningRig& running) {
+using Positions = std::array<double, ServedRig::kAxes>;
+
+Positions positions(RunningRig& running) {
+  Positions all{};
   for (int i = 0; i < ServedRig::kAxes; ++i) {
-    if (running.rig().usb().state(i).velocity_units_per_s == 0.0) return false;
+    all[static_cast<std::size_t>(i)] = running.rig().usb().state(i).position_units;
   }
-  return true;
+  return all;
 }
 
-bool allRest(RunningRig& running) {
-  for (int i = 0; i < ServedRig::kAxes; ++i) {
-    if (running.rig().usb().state(i).velocity_units_per_s != 0.0) return false;
-  }
-  return true;
+/// Until the session is there, homing is over, and every axis has drawn in 0.3 mm.
+bool waitUntilAllPull(RunningRig& running, const std::string& session) {
+  constexpr double kDrawn_units = 300.0;
+  if (!waitFor(40.0, [&] { return std::filesystem::exists(session); })) return false;
+  const Positions before = positions(running);
+  return waitFor(10.0, [&] {
+    const Positions now = positions(running);
+    return std::equal(now.begin(), now.end(), before.begin(),
+                      [](double at, double from) { return at > from + kDrawn_units; });
+  });
 }
 
-/// Milliseconds until all axes rest; they are halted without a ramp.
-double restingTime_ms(RunningRig& running) {
+/// Milliseconds until the last movement of any axis within a span that unloading does not reach.
+double restingTime_ms(RunningRig& running, double span_s) {
   const auto start = std::chrono::steady_clock::now();
-  EXPECT_TRUE(waitFor(2.0, [&] { return allRest(running); }));
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-      .count();
+  double last_ms = 0.0;
+  Positions before = positions(running);
+  waitFor(span_s, [&] {
+    const Positions now = positions(running);
+    if (now != before) {
+      last_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                    .count();
+    }
+    before = now;
+    return false;
+  });
+  return last_ms;
 }
 
 void runsAWholeSession(bool tcp) {
@@ -108,17 +127,16 @@ TEST(TenterdTest, AForceBeyondTheLimitHaltsAllAxes) {
   constexpr int kTrials = 5;
   constexpr double kLimit_ms = 25.0;
   constexpr double kBeyond_N = 20.0;
+  constexpr double kBeforeUnloading_s = 0.09;
   RunningRig running;
   const std::string protocol = running.write("all.toml", kAllAxes);
   std::vector<double> times_ms;
   for (int trial = 0; trial < kTrials; ++trial) {
     const std::string session = running.path("session-" + std::to_string(trial));
     const pid_t client = running.startTenterRig({"run", protocol, "-o", session});
-    ASSERT_TRUE(waitFor(30.0, [&] {
-      return running.rig().usb().state(0).position_units > 600.0 && allMove(running);
-    }));
+    ASSERT_TRUE(waitUntilAllPull(running, session));
     running.rig().addForce((3 * trial) % ServedRig::kAxes, kBeyond_N);
-    times_ms.push_back(restingTime_ms(running));
+    times_ms.push_back(restingTime_ms(running, kBeforeUnloading_s));
     running.rig().addForce((3 * trial) % ServedRig::kAxes, 0.0);
     EXPECT_EQ(RunningRig::wait(client), 7);
     EXPECT_THAT(logOf(session), HasSubstr("\"fault\":\"absolute-force\""));
@@ -138,22 +156,18 @@ TEST(TenterdTest, AnybodysStopHaltsAndAKilledDaemonIsOutlivedByTheDevicesTimeout
   RunningRig running;
   const std::string protocol = running.write("all.toml", kAllAxes);
   pid_t client = running.startTenterRig({"run", protocol, "-o", running.path("one")});
-  ASSERT_TRUE(waitFor(30.0, [&] {
-    return running.rig().usb().state(0).position_units > 600.0 && allMove(running);
-  }));
+  ASSERT_TRUE(waitUntilAllPull(running, running.path("one")));
   EXPECT_EQ(running.tenterRig({"stop"}), 0);
-  EXPECT_TRUE(allRest(running));
+  EXPECT_LE(restingTime_ms(running, 0.2), 1.0);
   EXPECT_EQ(RunningRig::wait(client), 7);
   EXPECT_EQ(running.status()["state"], "stopped");
   ASSERT_EQ(running.tenterRig({"unload"}), 0);
   ASSERT_EQ(running.tenterRig({"reset"}), 0);
 
   client = running.startTenterRig({"run", protocol, "-o", running.path("two")});
-  ASSERT_TRUE(waitFor(30.0, [&] {
-    return running.rig().usb().state(0).position_units > 600.0 && allMove(running);
-  }));
+  ASSERT_TRUE(waitUntilAllPull(running, running.path("two")));
   kill(running.daemon(), SIGKILL);
-  EXPECT_LE(restingTime_ms(running), kLimit_ms);
+  EXPECT_LE(restingTime_ms(running, 0.5), kLimit_ms);
   EXPECT_EQ(RunningRig::wait(client), 6);
   const auto report = verifySession(running.path("two"));
   ASSERT_TRUE(report.ok());
@@ -166,9 +180,7 @@ TEST(TenterdTest, AVanishedOperatorEndsTheRunInUnloading) {
   const std::string protocol = running.write("all.toml", kAllAxes);
   const std::string session = running.path("session");
   const pid_t client = running.startTenterRig({"run", protocol, "-o", session});
-  ASSERT_TRUE(waitFor(30.0, [&] {
-    return running.rig().usb().state(0).position_units > 600.0 && allMove(running);
-  }));
+  ASSERT_TRUE(waitUntilAllPull(running, session));
   kill(client, SIGKILL);
   RunningRig::wait(client);
   ASSERT_TRUE(waitFor(10.0, [&] {
@@ -186,7 +198,7 @@ TEST(TenterdTest, TheSocketIsForItsGroupAndOneOperator) {
   EXPECT_EQ(info.st_mode & 0777U, 0660U);
   const std::string protocol = running.write("all.toml", kAllAxes);
   const pid_t client = running.startTenterRig({"run", protocol, "-o", running.path("one")});
-  ASSERT_TRUE(waitFor(30.0, [&] { return allMove(running); }));
+  ASSERT_TRUE(waitUntilAllPull(running, running.path("one")));
   EXPECT_EQ(running.tenterRig({"jog", "axis-1", "--by-mm", "-1"}), 7);
   EXPECT_EQ(running.tenterRig({"stop"}), 0);
   EXPECT_EQ(RunningRig::wait(client), 7);

@@ -168,8 +168,10 @@ class RigMachine {
   Activity activity_ = Activity::kNone;
   const RigTick* tick_ = nullptr;  ///< While in step().
   RigOrders* orders_ = nullptr;
-  std::vector<AxisInput> axes_;  ///< The last readings that count.
-  std::vector<std::optional<std::int64_t>> heard_ns_;
+  std::vector<AxisInput> axes_;                        ///< The last readings that count.
+  std::vector<std::optional<std::int64_t>> heard_ns_;  ///< Of each axis, when it last answered.
+  std::vector<std::int64_t> felt_ns_;                  ///< Of each cell, its last tension.
+  bool blind_ = false;  ///< A cell is without tension while something would load.
   std::optional<std::int64_t> last_ns_;
   double dt_s_ = 0.0;
   std::int64_t since_ns_ = 0;  ///< When the activity began.
