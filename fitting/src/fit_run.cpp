@@ -24,10 +24,10 @@ constexpr int kScanFrames = 4;
 constexpr double kEarlyTolerance = 1e-2;
 constexpr double kFinalTolerance = 1e-6;
 constexpr int kEarlyIterations = 10;
-/// Rounds over the blocks end when none lowers its cost by more than this share.
-constexpr double kSettledGain = 1e-4;
+/// Rounds over the blocks end when none lowers its cost by more than this share, or than this many
+/// misfits per residual: a gain of x of those moves the curves by sqrt(2 x) standard deviations.
+constexpr double kSettledGain = 1e-4, kSettledMisfits = 0.05;
 constexpr int kMaxPasses = 6;
-constexpr int kRefitRounds = 3;
 constexpr double kRefitGain = 0.2;
 /// A first guess may be far off; that is not noise.
 constexpr double kLargestMisfit = 100.0;
@@ -105,12 +105,13 @@ std::vector<int> FitRun::allTests() const {
   return all;
 }
 
-std::vector<FrameId> FitRun::framesOf(const std::vector<int>& tests, int per_test) const {
+std::vector<FrameId> FitRun::framesOf(const std::vector<int>& tests, int per_test,
+                                      int least_residuals) const {
   std::vector<FrameId> frames;
   for (const int t : tests) {
     int wanted = per_test;
-    if (per_test == kEarlyFrames && tests_[t]->frameCount() > 0)
-      wanted = std::max(per_test, kEarlyResiduals / std::max(1, tests_[t]->residualCount(0)));
+    if (per_test > 0 && tests_[t]->frameCount() > 0)
+      wanted = std::max(per_test, least_residuals / std::max(1, tests_[t]->residualCount(0)));
     for (const int f : spreadFrames(tests_[t]->frameCount(), wanted))
       if (tests_[t]->residualCount(f) > 0) frames.push_back({t, f});
   }
@@ -132,7 +133,7 @@ bool FitRun::solve(const std::vector<int>& groups, const std::vector<int>& tests
                    const OuterOptions& outer, const std::string& stage) {
   for (const int g : groups) state_.updateReference(g);
   const auto space = std::make_shared<FitSpace>(state_, groups);
-  evaluator_.configure(space, framesOf(tests, per_test));
+  evaluator_.configure(space, framesOf(tests, per_test, kEarlyResiduals));
   const Eigen::VectorXd start = space->start();
   noteDropped(evaluator_.dropFailing(start), stage);
   if (evaluator_.frames().empty() || space->size() == 0 || !evaluator_.evaluate(start))
@@ -278,6 +279,14 @@ void FitRun::reconsiderShapes(const FitBlock& block) {
   evaluator_.adoptNearerShapes();
 }
 
+double FitRun::negligibleGain() const {
+  long residuals = 0;
+  for (const FrameId& id : evaluator_.frames())
+    residuals += tests_[id.test]->residualCount(id.frame);
+  const double misfit = 2.0 * last_.cost / static_cast<double>(std::max(1L, residuals));
+  return std::max(kSettledGain * last_.initial_cost, kSettledMisfits * misfit);
+}
+
 /// Block after block, until a round changes nothing any more: what one block gives, the next takes
 /// as given.
 bool FitRun::refine() {
@@ -290,7 +299,7 @@ bool FitRun::refine() {
       if (evaluator_.cancelled()) return true;
       if (!refineBlock(block, pass)) return false;
       all_converged = all_converged && last_.converged;
-      settled = settled && last_.initial_cost - last_.cost <= kSettledGain * last_.initial_cost;
+      settled = settled && last_.initial_cost - last_.cost <= negligibleGain();
     }
     converged = all_converged && !evaluator_.cancelled();
     complete_ = true;
@@ -300,6 +309,7 @@ bool FitRun::refine() {
 }
 
 bool FitRun::run() {
+  evaluator_.requireProof(false);
   std::vector<const Measurement*> measurements;
   for (const FitTest* test : tests_) measurements.push_back(&test->measurement());
   setInitialGuesses(state_, measurements, roles_);
@@ -318,7 +328,8 @@ bool FitRun::settle() {
     blocks_ = fitBlocks(state_, roles_);
   }
   const auto space = std::make_shared<FitSpace>(state_, refined_);
-  evaluator_.configure(space, framesOf(allTests(), complete_ ? 0 : kEarlyFrames));
+  evaluator_.requireProof(true);
+  evaluator_.configure(space, framesOf(allTests(), complete_ ? 0 : kEarlyFrames, kEarlyResiduals));
   last_.z = space->start();
   noteDropped(evaluator_.dropFailing(last_.z), "the statistics");
   if (evaluator_.frames().empty() || !evaluator_.evaluate(last_.z, false)) return false;
@@ -326,17 +337,28 @@ bool FitRun::settle() {
   return true;
 }
 
-bool FitRun::refit(FitState start, const std::vector<int>& groups, int max_iterations,
-                   double tolerance) {
+bool FitRun::refit(FitState start, const std::vector<int>& groups, const Refit& how) {
+  evaluator_.requireProof(false);
   state_ = std::move(start);
   refined_ = groups;
   complete_ = false;
-  const OuterOptions outer{
-      .relative_tolerance = tolerance, .max_iterations = max_iterations, .progress = {}};
+  const auto space = std::make_shared<FitSpace>(state_, refined_);
+  evaluator_.configure(space, framesOf(allTests(), how.frames, kEarlyResiduals));
+  // The first to fail says that this cloth is another; the rest would take minutes to say the same.
+  if (!evaluator_.evaluate(space->start())) return false;
+  evaluator_.accept();
+  last_ = {.z = space->start(),
+           .initial_cost = evaluator_.cost(),
+           .cost = evaluator_.cost(),
+           .usable = true};
+  const OuterOptions outer{.max_rejected_steps = 1,
+                           .relative_tolerance = how.relative_tolerance,
+                           .max_iterations = how.max_iterations,
+                           .progress = {}};
   // Another law starts from a misfit that is not noise: the second round knows better what noise
   // is.
-  for (int round = 0; round < kRefitRounds; ++round) {
-    if (!solve(refined_, allTests(), kEarlyFrames, outer, "alternative law")) return false;
+  for (int round = 0; round < how.rounds; ++round) {
+    if (!solve(refined_, allTests(), how.frames, outer, "alternative law")) return false;
     if (last_.cost > (1.0 - kRefitGain) * last_.initial_cost) break;
   }
   converged = last_.converged;

@@ -34,9 +34,15 @@ class FitRun {
   /// Guess, a stage a group, then all together. False when not even a first equilibrium exists (see
   /// `warnings`) or nothing was fitted.
   bool run();
-  /// From a given state: no stages, only the groups named, all tests that see them, few iterations.
-  /// For alternatives of the law.
-  bool refit(FitState start, const std::vector<int>& groups, int max_iterations, double tolerance);
+  struct Refit {
+    int frames = 0;  ///< Of each test.
+    int rounds = 0;  ///< None: the residuals of the start.
+    int max_iterations = 0;
+    double relative_tolerance = 0.0;
+  };
+  /// From a given state: no stages, only the groups named, on a few frames of all tests. For
+  /// alternatives of the law; false if one of the frames has no stable equilibrium at the start.
+  bool refit(FitState start, const std::vector<int>& groups, const Refit& how);
 
   /// Brings the tests to the best point, with derivatives by everything that was fitted; on a few
   /// frames only if the refinement did not come to its end.
@@ -56,7 +62,10 @@ class FitRun {
   std::vector<std::string> warnings;
 
  private:
-  std::vector<FrameId> framesOf(const std::vector<int>& tests, int per_test) const;
+  /// @param per_test  0: all.
+  /// @param least_residuals  more frames of tests that have fewer residuals.
+  std::vector<FrameId> framesOf(const std::vector<int>& tests, int per_test,
+                                int least_residuals = 0) const;
   bool solve(const std::vector<int>& groups, const std::vector<int>& tests, int per_test,
              const OuterOptions& outer, const std::string& stage);
   void scan(int group, const std::vector<int>& tests);
@@ -64,6 +73,7 @@ class FitRun {
   void addKnots(int group, const std::vector<int>& tests, const OuterOptions& outer);
   const std::vector<double>* givenKnots(int group) const;
   bool refine();
+  double negligibleGain() const;
   bool refineBlock(const FitBlock& block, int pass);
   void reconsiderShapes(const FitBlock& block);
   void reweigh(const std::vector<int>& tests);

@@ -117,6 +117,11 @@ bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
   return true;
 }
 
+void FrameEvaluator::requireProof(bool required) {
+  for (FitTest* test : tests_) test->requireProof(required);
+  valid_ = false;
+}
+
 void FrameEvaluator::accept() {
   for (FitTest* test : tests_) test->accept();
 }

@@ -59,6 +59,8 @@ class FrameEvaluator {
   double cost() const;  ///< Half the sum of squares at the point evaluated last.
   bool cancelled() const { return cancelled_ && cancelled_(); }
   void ignoreCancelling() { cancelled_ = nullptr; }
+  /// Of all tests (FitTest::requireProof).
+  void requireProof(bool required);
   const SolveCounts& counts() const { return counts_; }
   int threads() const { return threads_; }
 

@@ -18,8 +18,9 @@ constexpr double kPoissonRatio = 0.3;
 /// An alternative counts when its sum of squares is at most this times that of the diagonal law (or
 /// of pure noise).
 constexpr double kAboutAsGood = 1.5;
-constexpr int kIterations = 8;
-constexpr double kTolerance = 1e-3;
+/// A few iterations on a few frames tell whether a law meets the data about as well.
+constexpr FitRun::Refit kRefit{
+    .frames = 6, .rounds = 2, .max_iterations = 6, .relative_tolerance = 1e-2};
 
 /// Couplings of an alternative. They are given, not fitted: three angles hardly tell a coupling
 /// from a curve of the shear, so a fit would leave it near where it began, and what matters is what
@@ -27,15 +28,16 @@ constexpr double kTolerance = 1e-3;
 struct Alternative {
   const char* name;
   double poisson_ratio;
-  double stiffening;  ///< Shear stiffness at rest is doubled by a stretch of kStrain over this.
+  double stiffening;  ///< By the largest measured stretch, in shear stiffnesses at rest.
 };
-constexpr double kStrain = 0.05;
 constexpr Alternative kAlternatives[] = {
     {"poisson", kPoissonRatio, 0.0},
     {"cross-stiffening", 0.0, 1.0},
     {"strong cross-stiffening", 0.0, 4.0},
-    {"cross-softening", 0.0, -1.0},
+    {"cross-softening", 0.0, -0.8},
 };
+/// Where no stretch was measured.
+constexpr double kOrdinaryStretch = 0.05;
 
 /// The model with the same strains and all of this one's components, and couplings besides.
 const ClothModel* coupledSister(const ClothModel& model) {
@@ -67,13 +69,23 @@ double stiffnessAtRest(const FitState& state, const char* name) {
   return state.componentCurve(state.model->componentIndex(name)).curve.evaluate(0.0).stiffness;
 }
 
+double largestStretch(const FitState& state) {
+  double largest = 0.0;
+  for (const char* name : {"stretch_weft", "stretch_warp"}) {
+    const int component = state.model->componentIndex(name);
+    largest = std::max(largest, state.componentCurve(component).curve.strains().back());
+  }
+  return largest > 0.0 ? largest : kOrdinaryStretch;
+}
+
 void setCouplings(FitState& state, const Alternative& alternative) {
   const double stretch =
       std::sqrt(stiffnessAtRest(state, "stretch_weft") * stiffnessAtRest(state, "stretch_warp"));
   const int poisson = state.groupOf(state.model->componentIndex("poisson"));
   const int cross = state.groupOf(state.model->componentIndex("cross_stiffening"));
   state.setConstant(poisson, alternative.poisson_ratio * stretch);
-  const double scale = std::max(stiffnessAtRest(state, "shear"), 1e-3 * stretch) / kStrain;
+  const double scale =
+      std::max(stiffnessAtRest(state, "shear"), 1e-3 * stretch) / largestStretch(state);
   state.setConstant(cross, alternative.stiffening * scale);
 }
 
@@ -94,12 +106,11 @@ std::vector<Measurement> membraneMeasurements(const FitRun& fitted,
   return chosen;
 }
 
-/// Sum of squares of the diagonal law on the frames that the alternatives are judged on.
+/// Sum of squares of the diagonal law on the frames that the alternatives are judged on; not finite
+/// if one has no equilibrium.
 double diagonalChi2(FitRun& run, const FitState& start) {
-  const auto space = std::make_shared<FitSpace>(start, seenGroups(start, run.roles()));
-  run.evaluator().configure(space, run.evaluator().frames());
-  if (!run.evaluator().evaluate(space->start())) return std::numeric_limits<double>::infinity();
-  return 2.0 * run.evaluator().cost();
+  const bool solved = run.refit(start, movingGroups(start, run), {.frames = kRefit.frames});
+  return solved ? 2.0 * run.last().cost : std::numeric_limits<double>::infinity();
 }
 
 nlohmann::json alternativeJson(FitRun& run, const Alternative& alternative, double chi2,
@@ -127,27 +138,27 @@ nlohmann::json lawAlternatives(const FitRun& fitted, const std::vector<Measureme
 
   FitRun run(*sister, pointers, options);
   const FitState start = translate(fitted.state(), *sister);
-  double diagonal = -1.0;
+  const double diagonal = diagonalChi2(run, start);
+  if (!std::isfinite(diagonal)) return nullptr;
+  double residuals = 0.0;
+  for (std::size_t t = 0; t < chosen.size(); ++t)
+    residuals += run.evaluator().rawResidualCount(static_cast<int>(t));
   nlohmann::json json = {{"coupled_law", sister->id},
+                         {"diagonal_chi2", diagonal},
+                         {"residuals", residuals},
                          {"alternatives", nlohmann::json::array()},
                          {"rejected", nlohmann::json::array()}};
   for (const Alternative& alternative : kAlternatives) {
+    if (run.evaluator().cancelled()) break;
     FitState coupled = start;
     setCouplings(coupled, alternative);
-    const bool usable = !run.evaluator().cancelled() &&
-                        run.refit(coupled, movingGroups(coupled, run), kIterations, kTolerance);
-    if (!usable) continue;
+    if (!run.refit(coupled, movingGroups(coupled, run), kRefit)) {
+      json["rejected"].push_back({{"name", alternative.name}, {"chi2", nullptr}});
+      continue;
+    }
     const double chi2 = 2.0 * run.last().cost;
-    const nlohmann::json entry = alternativeJson(run, alternative, chi2, chosen, options);
-    if (diagonal < 0.0) diagonal = diagonalChi2(run, start);
-    double residuals = 0.0;
-    for (std::size_t t = 0; t < chosen.size(); ++t)
-      residuals += run.evaluator().rawResidualCount(static_cast<int>(t));
-    json["diagonal_chi2"] = diagonal;
-    json["residuals"] = residuals;
-    const bool as_good = chi2 <= kAboutAsGood * std::max(diagonal, residuals);
-    if (as_good)
-      json["alternatives"].push_back(entry);
+    if (chi2 <= kAboutAsGood * std::max(diagonal, residuals))
+      json["alternatives"].push_back(alternativeJson(run, alternative, chi2, chosen, options));
     else
       json["rejected"].push_back({{"name", alternative.name}, {"chi2", chi2}});
   }

@@ -18,9 +18,6 @@ constexpr double kParameterTolerance = 1e-9;
 /// Damping of the first step is 1 / radius of the diagonal: Ceres' own 1e4 leaves so little of it
 /// that several rejections in a row would change nothing, and each costs a set of equilibria.
 constexpr double kFirstRadius = 100.0;
-/// Each rejection shortens the step by twice as much as the last: after five there is nothing to
-/// gain.
-constexpr int kMaxRejectedSteps = 5;
 /// Two steps in a row that gain less than this share of the cost, or one and then a rejection, mean
 /// that what is left are jumps between shapes: a smooth sum of squares converges quadratically.
 constexpr double kStalledGain = 1e-3;
@@ -91,7 +88,7 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
     const bool accepted = iteration.iteration == 0 || iteration.step_is_successful;
     if (accepted) accept(iteration.iteration);
     rejected_ = accepted ? 0 : rejected_ + 1;
-    const bool stalled = rejected_ >= kMaxRejectedSteps || (!accepted && gain_ < kStalledGain) ||
+    const bool stalled = rejected_ >= options_.max_rejected_steps || (!accepted && gain_ < kStalledGain) ||
                          (gain_ < kStalledGain && previous_gain_ < kStalledGain);
     summary_.iterations = iteration.iteration;
     if (options_.progress) options_.progress(iteration.iteration, summary_.cost);

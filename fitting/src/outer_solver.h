@@ -20,6 +20,9 @@ inline constexpr double kPriorRelativeStd = 2.0;
 Prior weakPrior(const FitSpace& space, double misfit);
 
 struct OuterOptions {
+  /// Each rejection shortens the step by twice as much as the last: after five there is nothing to
+  /// gain.
+  int max_rejected_steps = 5;
   double relative_tolerance =
       1e-2;  ///< Stop when the cost falls by less between iterations ([Est12] sec. 5.1).
   int max_iterations = 30;

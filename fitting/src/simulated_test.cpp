@@ -118,6 +118,7 @@ void SimulatedTest::setLaws(const ClothLaws& laws) {
 
 EquilibriumOptions SimulatedTest::solverOptions(int max_iterations) const {
   EquilibriumOptions solver;
+  solver.prove_stability = require_proof_;
   solver.max_iterations = max_iterations;
   solver.force_tolerance_N =
       options_.equilibrium_tolerance_N > 0.0 ? options_.equilibrium_tolerance_N : forceTolerance_N;
@@ -162,6 +163,7 @@ FrameOutcome SimulatedTest::solveFrom(Simulation& simulation, std::vector<ClothS
     outcome.factorizations += summary.factorizations;
     outcome.converged = summary.converged();
     outcome.stable = summary.converged() && summary.stable;
+    outcome.proven = summary.converged() && summary.proven;
     outcome.problem = describe(summary.termination);
     if (outcome.converged) break;
   }
@@ -188,9 +190,13 @@ Eigen::MatrixXd SimulatedTest::solve(Simulation& simulation, int index, bool wit
   if (isCurrent(current)) {
     outcome = current.outcome;
     outcome.newton_steps = outcome.factorizations = 0;
-    if (with_derivatives && outcome.stable) {
+    const bool proof_missing = require_proof_ && !outcome.proven;
+    if (outcome.stable && (with_derivatives || proof_missing)) {
       outcome.stable = simulation.solver.factorize(current.state);
+      outcome.proven = true;
       outcome.factorizations = 1;
+      current.outcome.stable = outcome.stable;
+      current.outcome.proven = true;
     }
   } else {
     Solution fresh{generation_, {}, parameters_, {}, {}};

@@ -40,6 +40,7 @@ class SimulatedTest : public FitTest {
   void accept() final;
   void restart() final;
   void reweigh() final;
+  void requireProof(bool required) final { require_proof_ = required; }
   MultistabilityReport crossCheck(int frame) final;
   bool adoptNearerShape(int frame) final;
   FramePrediction predict(int frame, bool with_derivatives) final;
@@ -119,6 +120,7 @@ class SimulatedTest : public FitTest {
   FitTestOptions options_;
   std::shared_ptr<SwitchableLaw> membrane_law_, bending_law_;
   Bases bases_;
+  bool require_proof_ = true;
   int generation_ = 0;  ///< Counts changes of the parameters' structure.
   Eigen::VectorXd parameters_;
   std::vector<std::unique_ptr<Replica>> replicas_;

@@ -36,6 +36,7 @@ struct FitTestOptions {
 struct FrameOutcome {
   bool converged = false;
   bool stable = false;
+  bool proven = false;  ///< Stability was seen at the state itself, not at one near by.
   int newton_steps = 0;
   int factorizations = 0;
   std::string problem;  ///< Empty when all is well.
@@ -111,6 +112,10 @@ class FitTest {
   /// clip-pose error, anew from the next solved state of every frame, and keeps the warm starts.
   /// Otherwise they stay as of the first solved state, or of restart().
   virtual void reweigh() {}
+  /// Whether evaluate() proves each state stable with factors of its own (the default), or lets
+  /// those of a near state stand in, which halves their number, also in derivatives: for the way,
+  /// not for the end.
+  virtual void requireProof(bool /*required*/) {}
   /// Compares the frame's last solved state with the one reached from the measured shape. Changes
   /// neither.
   virtual MultistabilityReport crossCheck(int frame);

@@ -16,6 +16,9 @@ struct EquilibriumOptions {
   double force_tolerance_N = 0.0;
   /// Leave a saddle along its negative direction and go on; otherwise it is only reported.
   bool leave_saddles = true;
+  /// Prove stability with the Hessian at the end itself. Otherwise factors of one so near that
+  /// steps with them converge fast may stand in: half the factorisations, no proof.
+  bool prove_stability = true;
   /// Compute the smallest eigenvalue of H v = lambda M v [1/s^2].
   bool compute_lambda_min = false;
   double time_budget_s = 0.0;       ///< 0: none.
@@ -34,7 +37,8 @@ enum class Termination {
 
 struct EquilibriumSummary {
   Termination termination = Termination::kIterationLimit;
-  bool stable = false;  ///< No negative pivot in the Hessian at the end.
+  bool stable = false;  ///< No negative pivot in the Hessian at the end, or near it.
+  bool proven = false;  ///< The factors at hand are of the Hessian at the end.
   int newton_steps = 0;
   int factorizations = 0;
   double residual_N = 0.0;  ///< Largest force on a degree of freedom.
@@ -58,7 +62,7 @@ class EquilibriumSolver {
 
   /// Factorises the exact Hessian at `state`; false if it is not positive definite.
   bool factorize(const ClothState& state);
-  /// Solves H X = B with the last exact factorisation (of solve() or factorize()).
+  /// Solves H X = B with the last factorisation (of solve(), at or near its end, or factorize()).
   Eigen::MatrixXd solveLinear(const Eigen::MatrixXd& rhs);
 
  private:
