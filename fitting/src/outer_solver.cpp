@@ -88,7 +88,8 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
     const bool accepted = iteration.iteration == 0 || iteration.step_is_successful;
     if (accepted) accept(iteration.iteration);
     rejected_ = accepted ? 0 : rejected_ + 1;
-    const bool stalled = rejected_ >= options_.max_rejected_steps || (!accepted && gain_ < kStalledGain) ||
+    const bool stalled = rejected_ >= options_.max_rejected_steps ||
+                         (!accepted && gain_ < kStalledGain) ||
                          (gain_ < kStalledGain && previous_gain_ < kStalledGain);
     summary_.iterations = iteration.iteration;
     if (options_.progress) options_.progress(iteration.iteration, summary_.cost);
