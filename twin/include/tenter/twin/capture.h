@@ -40,7 +40,7 @@ struct CaptureOptions {
   bool friction = true;                    ///< Internal friction of the cloth; never with own_law.
   std::optional<OwnLaw> own_law;           ///< With nodes = 25 the sheet is that of a fit.
   std::function<void(int, int)> progress;  ///< Frames done, frames in all.
-  std::function<bool()> cancelled;         ///< Polled between frames.
+  std::function<bool()> cancelled;         ///< Polled between Newton steps.
 };
 
 /// What nothing but tests and `evaluate --truth` may open.
