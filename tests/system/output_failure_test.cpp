@@ -99,6 +99,29 @@ TEST(OutputFailure, ForeignFoldersStayAsTheyAre) {
   EXPECT_EQ(listFolder(folder.path()), Names{"thesis"});
 }
 
+TEST(OutputFailure, TheWorkingFolderIsNotPulledAwayNorNotesBesideAMeasurement) {
+  TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "here");
+  for (const char* output : {".", "..", "../here"}) {
+    for (const Arguments& arguments :
+         {importTo(output), captureTo(output), Arguments{"demo", "--out", output}}) {
+      const Outcome outcome = tenter(arguments, folder / "here");
+      EXPECT_EQ(outcome.exit_code, 3) << arguments.front() << " " << output;
+      EXPECT_THAT(outcome.err, HasSubstr("in which you work"));
+    }
+  }
+  EXPECT_EQ(listFolder(folder / "here"), Names{});
+  EXPECT_EQ(listFolder(folder.path()), Names{"here"});
+
+  ASSERT_EQ(tenter(importTo("m"), folder.path()).exit_code, 0);
+  ASSERT_EQ(tenter(importTo("m"), folder.path()).exit_code, 0) << "a measurement is replaced";
+  folder.write("m/notes.txt", "days of work");
+  const Outcome outcome = tenter(importTo("m"), folder.path());
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("m: holds 'notes.txt'"));
+  EXPECT_EQ(test_support::slurp(folder / "m" / "notes.txt"), "days of work");
+}
+
 TEST(Interrupted, ACaptureStopsWithinASecondInTheMiddleOfAFrame) {
   TemporaryFolder folder;
   // Its first frame alone takes longer than this test.
