@@ -15,6 +15,7 @@ packages=(
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-numpy python3-jsonschema
   python3-usb usbutils mbpoll python3-pymodbus python3-serial-asyncio
+  clang-16 libclang-rt-16-dev  # scripts/fuzz.sh
 )
 
 if [[ "${1:-}" == --list ]]; then

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "command.h"
 
+#include <cctype>
 #include <cstdio>
 
 namespace tenter::app {
@@ -14,7 +15,11 @@ void Console::warn(const std::string& line) const {
 }
 
 void Console::complain(const std::string& line) {
-  std::fprintf(stderr, "tenter: %s\n", line.c_str());
+  // Messages quote what files hold: a control character would cut them off or steer the terminal.
+  std::string shown = line;
+  for (char& c : shown)
+    if (std::iscntrl(static_cast<unsigned char>(c)) != 0) c = '?';
+  std::fprintf(stderr, "tenter: %s\n", shown.c_str());
 }
 
 void Console::fail(const Error& error) {

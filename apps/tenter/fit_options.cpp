@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "interrupt.h"
+
 namespace tenter::app {
 
 FitTestOptions SimulationOptions::inSi() const {
@@ -31,6 +33,8 @@ void declareSimulation(CLI::App& command, SimulationOptions& o) {
 Result<std::vector<Measurement>> readMeasurements(const std::vector<std::string>& folders) {
   std::vector<Measurement> measurements;
   for (const std::string& folder : folders) {
+    if (interrupted())
+      return notConverged("stopped while measurements were read; nothing was written");
     auto measurement = readMeasurement(folder);
     if (!measurement) return measurement.error();
     measurements.push_back(std::move(measurement).value());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "import_options.h"
 #include "output_guard.h"
+#include "tenter/core/measurement_folder.h"
 #include "verbs.h"
 
 namespace tenter::app {
@@ -44,7 +45,7 @@ Result<int> run(const Options& o, Console& console) {
   if (reach != drop || reach == !o.csv.empty()) {
     return usageError("give either --reach-mm and --drop-mm, or a CSV");
   }
-  if (auto free = checkOutputFolder(o.specimen.output, kMeasurementMarker); !free) {
+  if (auto free = checkOutputFolder(o.specimen.output, measurementFolder()); !free) {
     return free.error();
   }
   const auto measurement = import(o);

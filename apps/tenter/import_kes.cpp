@@ -8,7 +8,10 @@ namespace tenter::app {
 
 namespace {
 
-constexpr const char* kFolderMarker = "import.json";
+const FolderKind& materialsFolder() {
+  static const FolderKind kKind{"import.json", "\"kind\": \"kes\"", {"*.json"}};
+  return kKind;
+}
 
 struct Options {
   std::string csv, output;
@@ -32,7 +35,7 @@ void declare(CLI::App& command, Options& o) {
 
 Result<void> writeFolder(const Options& o, const std::vector<ImportedMaterial>& materials) {
   return writeFolderAtomically(
-      o.output, kFolderMarker, [&](const std::filesystem::path& folder) -> Result<void> {
+      o.output, materialsFolder(), [&](const std::filesystem::path& folder) -> Result<void> {
         auto files = nlohmann::json::array();
         for (const ImportedMaterial& m : materials) {
           const std::string name = m.material.fabric + ".json";
@@ -40,14 +43,14 @@ Result<void> writeFolder(const Options& o, const std::vector<ImportedMaterial>& 
           files.push_back({{"file", name}, {"flagged", flaggedToJson(m.flagged)}});
         }
         const nlohmann::json index = {{"kind", "kes"}, {"materials", files}};
-        return writeFileAtomically(folder / kFolderMarker, index.dump(2) + "\n");
+        return writeFileAtomically(folder / materialsFolder().marker, index.dump(2) + "\n");
       });
 }
 
 Result<int> run(const Options& o, Console& console) {
   const bool single = !o.fabric.empty();
   const auto free =
-      single ? checkMaterialOutput(o.output) : checkOutputFolder(o.output, kFolderMarker);
+      single ? checkMaterialOutput(o.output) : checkOutputFolder(o.output, materialsFolder());
   if (!free) return free.error();
   KesImportOptions options;
   if (single) options.fabric = o.fabric;

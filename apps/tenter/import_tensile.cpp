@@ -3,6 +3,7 @@
 
 #include "import_options.h"
 #include "output_guard.h"
+#include "tenter/core/measurement_folder.h"
 #include "verbs.h"
 
 namespace tenter::app {
@@ -59,7 +60,7 @@ Result<TensileImportOptions> inSi(const Options& o) {
 Result<int> run(const Options& o, Console& console) {
   const auto options = inSi(o);
   if (!options) return options.error();
-  if (auto free = checkOutputFolder(o.specimen.output, kMeasurementMarker); !free) {
+  if (auto free = checkOutputFolder(o.specimen.output, measurementFolder()); !free) {
     return free.error();
   }
   const auto measurement = importTensile(o.csv, *options);

@@ -31,6 +31,7 @@ std::string beginningOf(const fs::path& file) {
 /// Whether something may be put below the nearest folder that is there: hours of a fit are not to
 /// end at a folder that nobody may write to.
 Result<void> checkPlace(const fs::path& output) {
+  if (output.empty()) return usageError("the name of the output is empty");
   std::error_code error;
   fs::path folder = fs::absolute(output, error).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
@@ -80,16 +81,9 @@ Result<void> checkMaterialOutput(const fs::path& file) {
   return notOurs(file);
 }
 
-Result<void> checkOutputFolder(const fs::path& folder, std::string_view marker) {
-  std::error_code error;
+Result<void> checkOutputFolder(const fs::path& folder, const FolderKind& kind) {
   if (auto ok = checkPlace(folder); !ok) return ok.error();
-  const auto status = fs::status(folder, error);
-  if (!fs::exists(status)) return {};
-  if (!fs::is_directory(status)) {
-    return badInput(folder.string(), "", "exists and is not a folder", kAdvice);
-  }
-  if (fs::is_empty(folder, error) || fs::exists(folder / marker, error)) return {};
-  return notOurs(folder);
+  return checkFolderReplaceable(folder, kind);
 }
 
 }  // namespace tenter::app

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include "tenter/core/files.h"
 #include "tenter/core/result.h"
 
 namespace tenter::app {
@@ -15,10 +16,7 @@ namespace tenter::app {
 Result<void> checkOutputFile(const std::filesystem::path& file, std::string_view marker);
 /// Error if the file exists and is no material file.
 Result<void> checkMaterialOutput(const std::filesystem::path& file);
-/// Error if the folder holds something but not the file `marker`, or is no folder.
-Result<void> checkOutputFolder(const std::filesystem::path& folder, std::string_view marker);
-
-/// Marks a folder as a measurement.
-inline constexpr std::string_view kMeasurementMarker = "measurement.json";
+/// Error if a folder of this kind cannot be put there, or would replace anything else.
+Result<void> checkOutputFolder(const std::filesystem::path& folder, const FolderKind& kind);
 
 }  // namespace tenter::app

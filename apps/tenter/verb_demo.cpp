@@ -230,7 +230,8 @@ Result<bool> follow(const Course& course, const fs::path& folder, Report& report
 }
 
 Result<int> run(const Options& o, Console& console) {
-  if (auto free = checkOutputFolder(o.output, kMarker); !free) return free.error();
+  const FolderKind kind{kMarker, "\"kind\": \"demo\"", {"*"}};  // files are only added to it
+  if (auto free = checkOutputFolder(o.output, kind); !free) return free.error();
   const nlohmann::json marker = {{"kind", "demo"}, {"fabric", o.fabric}, {"seed", o.seed}};
   const fs::path marker_file = fs::path(o.output) / kMarker;
   if (auto done = writeFileAtomically(marker_file, marker.dump(2) + "\n"); !done) {

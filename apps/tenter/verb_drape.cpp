@@ -98,7 +98,12 @@ Result<ClothSystem> systemOf(const Options& o) {
   if (!material) return material.error();
   const auto model = findClothModel(material->law);
   if (!model) {
-    return badInput(o.material, "law", "is " + material->law + ", which cannot be simulated here");
+    return badInput(
+        o.material, "law",
+        "is " + material->law +
+            ", whose tabulated forces belong to no energy, and a drape is a minimum of one",
+        "drape it in its own program, or fit a law of tenter to measurements of the "
+        "fabric");
   }
   const auto laws = makeLaws(**model, *material);
   if (!laws) return laws.error().in(o.material);

@@ -94,7 +94,7 @@ Result<int> run(const Options& o, Console& console) {
   options.threads = o.simulation.threads;
   options.predictions = o.predictions;
   const auto tests = evaluateMaterial(*material, *measurements, options);
-  if (!tests) return tests.error();
+  if (!tests) return tests.error().file.empty() ? tests.error().in(o.material) : tests.error();
 
   auto& rows = console.answer["tests"] = nlohmann::json::array();
   int unconverged = 0;

@@ -64,6 +64,18 @@ Result<FitOptions> fitOptions(const Options& o, Progress& progress) {
   return options;
 }
 
+/// Twice the same numbers would look twice as certain.
+Result<void> checkDifferent(const std::vector<Measurement>& measurements) {
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (measurements[i].content_sha256 != measurements[j].content_sha256) continue;
+      return badInput(measurements[i].name, "", "holds the same numbers as " + measurements[j].name,
+                      "give each measurement once");
+    }
+  }
+  return {};
+}
+
 nlohmann::json curveToJson(const MaterialComponent& component) {
   auto knots = nlohmann::json::array();
   const auto& strains = component.curve.strains();
@@ -131,6 +143,7 @@ Result<int> run(const Options& o, Console& console) {
   if (!options) return options.error();
   const auto measurements = readMeasurements(o.measurements);
   if (!measurements) return measurements.error();
+  if (auto different = checkDifferent(*measurements); !different) return different.error();
   const auto fit = fitMaterial(*measurements, *options);
   if (!fit) return fit.error();
   if (auto done = writeMaterial(o.output, fit->material); !done) return done.error();

@@ -5,6 +5,7 @@
 #include "interrupt.h"
 #include "output_guard.h"
 #include "progress.h"
+#include "tenter/core/measurement_folder.h"
 #include "tenter/twin/capture.h"
 #include "verbs.h"
 
@@ -67,12 +68,13 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
 }
 
 Result<int> capture(const CaptureCommand& command, Console& console) {
-  if (auto free = checkOutputFolder(command.output, kMeasurementMarker); !free) return free.error();
+  if (auto free = checkOutputFolder(command.output, measurementFolder()); !free)
+    return free.error();
   if (!command.truth.empty()) {
     if (command.truth == command.output) {
       return usageError("--truth must be another folder than -o");
     }
-    if (auto free = checkOutputFolder(command.truth, "truth.json"); !free) return free.error();
+    if (auto free = checkOutputFolder(command.truth, truthFolder()); !free) return free.error();
   }
   CaptureOptions options = command.capture;
   options.noise = command.noise == "on";

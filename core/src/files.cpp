@@ -5,9 +5,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <fstream>
 #include <system_error>
 
 namespace tenter {
@@ -94,19 +96,31 @@ Result<void> prepareParent(const fs::path& target, const std::string& shown) {
   return {};
 }
 
-/// Whether a folder may be put in the place of what is there now.
-Result<void> checkReplaceable(const fs::path& target, const std::string& marker,
-                              const std::string& shown) {
+bool holdsWorkingFolder(const fs::path& target) {
   std::error_code error;
-  const fs::file_status status = fs::symlink_status(target, error);
-  if (!fs::exists(status)) return {};
-  if (!fs::is_directory(status)) {
-    return badInput(shown, "", "exists and is not a folder", "choose another name");
+  for (fs::path at = fs::current_path(error); !error && !at.empty(); at = at.parent_path()) {
+    if (fs::equivalent(at, target, error)) return true;
+    if (at == at.parent_path()) break;
   }
-  if (fs::is_empty(target, error) && !error) return {};
-  if (!marker.empty() && fs::is_regular_file(target / marker, error)) return {};
-  return badInput(shown, "", "exists and holds other files",
-                  "choose another name or empty the folder");
+  return false;
+}
+
+bool hasMarker(const fs::path& folder, const FolderKind& kind) {
+  constexpr std::streamsize kBeginning = 1 << 16;
+  std::error_code error;
+  if (kind.marker.empty() || !fs::is_regular_file(folder / kind.marker, error)) return false;
+  std::ifstream in(folder / kind.marker, std::ios::binary);
+  std::string text(static_cast<std::size_t>(kBeginning), '\0');
+  in.read(text.data(), kBeginning);
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  return text.find(kind.marker_text) != std::string::npos;
+}
+
+bool belongsTo(const FolderKind& kind, const std::string& name) {
+  const auto matches = [&name](const std::string& entry) {
+    return entry.starts_with('*') ? name.ends_with(entry.substr(1)) : name == entry;
+  };
+  return name == kind.marker || std::any_of(kind.entries.begin(), kind.entries.end(), matches);
 }
 
 /// Puts `built` in the place of `target`; what was there ends up under `built`'s name. Where the
@@ -176,11 +190,39 @@ Result<void> writeFileAtomically(const fs::path& file, std::string_view content)
   return {};
 }
 
-Result<void> writeFolderAtomically(const fs::path& folder, const std::string& replaceable_marker,
+Result<void> checkFolderReplaceable(const fs::path& folder, const FolderKind& kind) {
+  const std::string shown = folder.string();
+  const fs::path target = normalTarget(folder);
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(target, error);
+  if (!fs::exists(status)) return {};
+  if (!fs::is_directory(status)) {
+    return badInput(shown, "", "exists and is not a folder", "choose another name");
+  }
+  if (holdsWorkingFolder(target)) {
+    return badInput(shown, "", "is the folder in which you work, or one above it",
+                    "name a new folder");
+  }
+  if (fs::is_empty(target, error) && !error) return {};
+  constexpr const char* kAdvice = "choose another name or empty the folder";
+  if (!hasMarker(target, kind)) {
+    return badInput(shown, "", "exists and was not written by tenter for this purpose", kAdvice);
+  }
+  for (fs::directory_iterator at(target, error), end; !error && at != end; at.increment(error)) {
+    const std::string name = at->path().filename().string();
+    if (!belongsTo(kind, name)) {
+      return badInput(shown, "", "holds '" + name + "', which replacing it would destroy", kAdvice);
+    }
+  }
+  if (error) return badInput(shown, "", "cannot be read: " + error.message());
+  return {};
+}
+
+Result<void> writeFolderAtomically(const fs::path& folder, const FolderKind& kind,
                                    const std::function<Result<void>(const fs::path&)>& build) {
   const std::string shown = folder.string();
   const fs::path target = normalTarget(folder);
-  if (auto done = checkReplaceable(target, replaceable_marker, shown); !done) return done;
+  if (auto done = checkFolderReplaceable(folder, kind); !done) return done;
   if (auto done = prepareParent(target, shown); !done) return done;
   Scratch scratch(temporaryNameFor(target));
   std::error_code error;
@@ -189,7 +231,7 @@ Result<void> writeFolderAtomically(const fs::path& folder, const std::string& re
   if (auto done = build(scratch.path()); !done) return done;
   syncFolder(scratch.path());
   // The world may have moved on while the folder was being built.
-  if (auto done = checkReplaceable(target, replaceable_marker, shown); !done) return done;
+  if (auto done = checkFolderReplaceable(folder, kind); !done) return done;
   if (auto done = swapIn(scratch.path(), target, shown); !done) return done;
   syncFolder(target.parent_path());
   return {};

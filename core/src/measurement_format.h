@@ -17,6 +17,7 @@ inline constexpr const char* kHeaderFile = "measurement.json";
 inline constexpr const char* kFramesFile = "frames.jsonl";
 inline constexpr const char* kRestFile = "rest.vtp";
 inline constexpr const char* kPvdFile = "frames.pvd";
+inline constexpr const char* kFramesFolder = "frames";
 inline constexpr const char* kSigmaArray = "sigma_m";
 inline constexpr const char* kValidArray = "valid";
 inline constexpr int kMaxFrames = 100'000;
@@ -29,7 +30,7 @@ inline constexpr std::array<std::pair<Branch, std::string_view>, 3> kBranches{
 /// "frames/000012.vtp", relative to the folder.
 inline std::string meshFileOfFrame(std::size_t frame) {
   const std::string digits = std::to_string(frame);
-  std::string name = "frames/";
+  std::string name = std::string(kFramesFolder) + "/";
   name.append(digits.size() < 6 ? 6 - digits.size() : 0, '0');
   return name + digits + ".vtp";
 }

@@ -3,6 +3,7 @@
 
 #include "measurement_format.h"
 #include "tenter/core/files.h"
+#include "tenter/core/measurement_folder.h"
 #include "tenter/core/mesh_io.h"
 
 namespace tenter {
@@ -153,6 +154,14 @@ Result<void> buildFolder(const fs::path& folder, const Measurement& m) {
 
 }  // namespace
 
+const FolderKind& measurementFolder() {
+  static const FolderKind kKind{
+      format::kHeaderFile,
+      format::kFormat,
+      {format::kFramesFile, format::kRestFile, format::kPvdFile, format::kFramesFolder}};
+  return kKind;
+}
+
 Result<void> writeMeasurement(const fs::path& folder, const Measurement& measurement) {
   if (auto done = validateMeasurement(measurement, folder.string()); !done) return done;
   const auto build = [&measurement, &folder](const fs::path& scratch) -> Result<void> {
@@ -160,7 +169,7 @@ Result<void> writeMeasurement(const fs::path& folder, const Measurement& measure
     // The scratch name means nothing to the user.
     return done ? done : Result<void>(done.error().in(folder.string()));
   };
-  return writeFolderAtomically(folder, format::kHeaderFile, build);
+  return writeFolderAtomically(folder, measurementFolder(), build);
 }
 
 }  // namespace tenter

@@ -21,10 +21,12 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 constexpr const char* kMarker = "marker.json";
+constexpr const char* kOurs = "{\"format\": \"ours\"}";
+const FolderKind kKind{kMarker, "ours", {"a.txt", "*.txt"}};
 
 Result<void> buildOneFile(const fs::path& folder) {
   if (auto done = writeFileAtomically(folder / "a.txt", "a"); !done) return done;
-  return writeFileAtomically(folder / kMarker, "{}");
+  return writeFileAtomically(folder / kMarker, kOurs);
 }
 
 TEST(ReadFileTest, GivesEveryByteBack) {
@@ -69,14 +71,14 @@ TEST(WriteFileTest, SaysWhenTheParentIsAFile) {
 
 TEST(WriteFolderTest, AppearsComplete) {
   const TemporaryFolder folder;
-  ASSERT_TRUE(writeFolderAtomically(folder / "out/", kMarker, buildOneFile));
+  ASSERT_TRUE(writeFolderAtomically(folder / "out/", kKind, buildOneFile));
   EXPECT_THAT(listFolder(folder.path()), ElementsAre("out"));
   EXPECT_THAT(listFolder(folder / "out"), ElementsAre("a.txt", kMarker));
 }
 
 TEST(WriteFolderTest, FailureLeavesNothing) {
   const TemporaryFolder folder;
-  const auto done = writeFolderAtomically(folder / "out", kMarker, [](const fs::path& scratch) {
+  const auto done = writeFolderAtomically(folder / "out", kKind, [](const fs::path& scratch) {
     EXPECT_TRUE(buildOneFile(scratch));
     return Result<void>(badInput("", "", "halfway"));
   });
@@ -86,21 +88,21 @@ TEST(WriteFolderTest, FailureLeavesNothing) {
 
 TEST(WriteFolderTest, ExceptionLeavesTheOldFolderAsItWas) {
   const TemporaryFolder folder;
-  ASSERT_TRUE(writeFolderAtomically(folder / "out", kMarker, buildOneFile));
+  ASSERT_TRUE(writeFolderAtomically(folder / "out", kKind, buildOneFile));
   const auto throwing = [](const fs::path& scratch) -> Result<void> {
     EXPECT_TRUE(writeFileAtomically(scratch / "half.txt", "x"));
     throw std::runtime_error("killed");
   };
-  EXPECT_THROW((void)writeFolderAtomically(folder / "out", kMarker, throwing), std::runtime_error);
+  EXPECT_THROW((void)writeFolderAtomically(folder / "out", kKind, throwing), std::runtime_error);
   EXPECT_THAT(listFolder(folder.path()), ElementsAre("out"));
   EXPECT_THAT(listFolder(folder / "out"), ElementsAre("a.txt", kMarker));
 }
 
 TEST(WriteFolderTest, SwapsOutAFolderWithTheMarkerWhole) {
   const TemporaryFolder folder;
-  folder.write("out/marker.json", "{}");
+  folder.write("out/marker.json", kOurs);
   folder.write("out/stale.txt", "old");
-  ASSERT_TRUE(writeFolderAtomically(folder / "out", kMarker, buildOneFile));
+  ASSERT_TRUE(writeFolderAtomically(folder / "out", kKind, buildOneFile));
   EXPECT_THAT(listFolder(folder / "out"), ElementsAre("a.txt", kMarker));
   EXPECT_THAT(listFolder(folder.path()), ElementsAre("out"));
 }
@@ -109,15 +111,47 @@ TEST(WriteFolderTest, RefusesSomebodyElsesFolder) {
   const TemporaryFolder folder;
   folder.write("out/thesis.doc", "dear");
   const auto never = [](const fs::path&) -> Result<void> { throw std::logic_error("called"); };
-  const auto done = writeFolderAtomically(folder / "out", kMarker, never);
-  EXPECT_THAT(done.error().reason, HasSubstr("holds other files"));
+  const auto done = writeFolderAtomically(folder / "out", kKind, never);
+  EXPECT_THAT(done.error().reason, HasSubstr("was not written by tenter"));
   EXPECT_EQ(slurp(folder / "out/thesis.doc"), "dear");
+}
+
+TEST(WriteFolderTest, RefusesAFolderThatHoldsMoreThanItsKind) {
+  const TemporaryFolder folder;
+  folder.write("out/marker.json", kOurs);
+  folder.write("out/thesis.doc", "dear");
+  const auto done = writeFolderAtomically(folder / "out", kKind, buildOneFile);
+  EXPECT_THAT(done.error().reason, HasSubstr("'thesis.doc'"));
+  EXPECT_EQ(slurp(folder / "out/thesis.doc"), "dear");
+}
+
+TEST(WriteFolderTest, RefusesAMarkerOfAnotherProgram) {
+  const TemporaryFolder folder;
+  folder.write("out/marker.json", "{}");
+  const auto done = writeFolderAtomically(folder / "out", kKind, buildOneFile);
+  EXPECT_THAT(done.error().reason, HasSubstr("was not written by tenter"));
+  EXPECT_EQ(slurp(folder / "out/marker.json"), "{}");
+}
+
+TEST(WriteFolderTest, RefusesTheWorkingFolderAndThoseAbove) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "above/here");
+  const fs::path before = fs::current_path();
+  fs::current_path(folder / "above/here");
+  for (const char* name : {".", "..", "../here", "./"}) {
+    const auto done = writeFolderAtomically(name, kKind, buildOneFile);
+    EXPECT_THAT(done.ok() ? "" : done.error().reason, HasSubstr("in which you work")) << name;
+  }
+  EXPECT_TRUE(fs::equivalent(fs::current_path(), folder / "above/here"));
+  EXPECT_TRUE(writeFolderAtomically("out", kKind, buildOneFile).ok());
+  fs::current_path(before);
+  EXPECT_THAT(listFolder(folder / "above/here"), ElementsAre("out"));
 }
 
 TEST(WriteFolderTest, FillsAnEmptyFolder) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "out");
-  ASSERT_TRUE(writeFolderAtomically(folder / "out", kMarker, buildOneFile));
+  ASSERT_TRUE(writeFolderAtomically(folder / "out", kKind, buildOneFile));
   EXPECT_THAT(listFolder(folder / "out"), ElementsAre("a.txt", kMarker));
 }
 

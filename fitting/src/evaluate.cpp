@@ -30,7 +30,9 @@ struct Predictor {
 
 Result<Predictor> predictorOf(const Material& material) {
   const Result<const ClothModel*> model = findClothModel(material.law);
-  if (!model) return badInput("", "law", model.error().reason, model.error().advice);
+  if (!model)
+    return badInput("", "law", "is " + material.law + ", with which nothing can be predicted",
+                    model.error().advice);
   Predictor predictor;
   predictor.model = *model;
   Result<std::optional<ParameterSet>> parameters = parametersOf(material, **model);

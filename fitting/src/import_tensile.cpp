@@ -17,9 +17,10 @@ using import::shown;
 
 constexpr Eigen::Index kMinRows = 5;
 constexpr double kMaxStrain = 1.0;
-constexpr double kMinStrain = 1e-4;     // a whole test below this is a displacement in metres
-constexpr double kTurnFraction = 0.01;  // of the travel: less is the clamp's jitter
-constexpr int kMaxTurns = 60;           // thirty cycles; more is not a test but noise
+constexpr double kMaxForce_N = 20'000.0;  // as measurement files have it
+constexpr double kMinStrain = 1e-4;       // a whole test below this is a displacement in metres
+constexpr double kTurnFraction = 0.01;    // of the travel: less is the clamp's jitter
+constexpr int kMaxTurns = 60;             // thirty cycles; more is not a test but noise
 constexpr double kFirstRowsFraction = 0.06;
 constexpr Eigen::Index kFewFirstRows = 8, kFirstRows = 32;
 constexpr double kMaxExtrapolation = 0.05;  // of the strip's length
@@ -62,6 +63,12 @@ Result<void> checkRows(const NumberedTable& table, const Rows& rows, double leng
                     "the largest displacement is " + shown(1e3 * largest_m) + " mm, a strain of " +
                         shown(largest_m / length_m),
                     "displacements must be in mm, not in metres");
+  }
+  const double largest_N = rows.force_N.cwiseAbs().maxCoeff(&at);
+  if (largest_N > kMaxForce_N) {
+    return badInput(table.file, table.place(at),
+                    "the force " + shown(largest_N) + " N is beyond any test of cloth",
+                    "the second column is the force in N");
   }
   if (rows.force_N.maxCoeff() <= 0.0) {
     return badInput(table.file, "", "no force is positive", "tension counts positive, in N");

@@ -292,6 +292,33 @@ TEST(KesImport, ReproducesForceWorkShearAndBending) {
   EXPECT_TRUE(writeMaterial(folder / "a.json", a).ok());
 }
 
+TEST(KesImport, ReadsWhatSpreadsheetsMakeOfATable) {
+  TemporaryFolder folder;
+  const auto plain = importKes(folder.write("p.csv", std::string(kKesHead) + kKesBody), {});
+  ASSERT_TRUE(plain.ok()) << plain.error().message();
+  const std::string semicolons =
+      "\xEF\xBB\xBF# a comment\r\nProperty;Unit;A;B\r\nEMT;%;5,0;4,0\r\nLT;;0,7;0,8\r\n"
+      "B;gf\xC2\xB7"
+      "cm\xC2\xB2/cm;0,172;0,144\r\nG;\"gf/cm/\xC2\xB0\";2,18;1,538\r\n;;;\r\n";
+  const std::string tabs =
+      "property\tunit\tA\tB\nEMT\t%\t5,0\t4,0\nLT\t-\t0,7\t0,8\nB\tgf cm2/cm\t0,172\t0,144\n"
+      "G\tgf/cm/deg\t2,18\t1,538\n";
+  const std::string units_row =
+      "fabric,EMT,LT,thickness,B,G\n,%,-,mm,gf.cm^2/cm,gf/cm/deg\nA,5.0,0.7,0.6,0.172,2.18\n"
+      "B,4.0,0.8,,0.144,1.538\n";
+  for (const std::string& text : {semicolons, tabs, units_row}) {
+    const auto materials = importKes(folder.write("k.csv", text), {});
+    ASSERT_TRUE(materials.ok()) << text << materials.error().message();
+    ASSERT_EQ(materials->size(), plain->size());
+    for (std::size_t i = 0; i < plain->size(); ++i) {
+      EXPECT_EQ((*materials)[i].material.fabric, (*plain)[i].material.fabric);
+      for (const MaterialComponent& c : (*plain)[i].material.components)
+        EXPECT_EQ((*materials)[i].material.find(c.name)->curve.stiffnesses(), c.curve.stiffnesses())
+            << c.name;
+    }
+  }
+}
+
 TEST(KesImport, FlagsTheTwoMisprintsOfTheDenimTable) {
   const auto csv = findData("kes/six-denims.csv");
   if (!csv) GTEST_SKIP() << noData();
@@ -324,6 +351,12 @@ TEST(KesImport, RefusesBrokenTables) {
   EXPECT_THAT(says("property,unit,A,../B\n" + body), HasSubstr("cannot name"));
   EXPECT_THAT(says(head + body + "EMT,%,5.0,4.0\n"), HasSubstr("twice"));
   EXPECT_THAT(says(head + body, {.fabric = "Z"}), HasSubstr("A B"));
+  EXPECT_THAT(says("property;unit;A\nEMT;%;5,0\nLT;-;0.7\n"), HasSubstr("line 3"));
+  EXPECT_THAT(says("property;unit;A\nEMT;%;1,234,5\n"), HasSubstr("not a finite number"));
+  EXPECT_THAT(says("fabric,EMT,LT,B,G\nA,5,0.7,0.17,2.2\n"), HasSubstr("must be in \"%\""));
+  EXPECT_THAT(says("fabric,EMT,LT,B,G\n"), HasSubstr("no fabric"));
+  EXPECT_THAT(says("fabric,EMT,LT,B,G\n,%,-,gf.cm2/cm,gf/cm/deg\nA,5,0.7,0.17\n"),
+              HasSubstr("line 3: has 4 columns"));
 }
 
 }  // namespace

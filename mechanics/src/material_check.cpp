@@ -191,7 +191,8 @@ std::vector<MaterialFinding> checkMaterial(const Material& material) {
     checkEvidence(info, component, out);
   }
   if (isTabulatedLaw(material.law)) {
-    out.push_back({Severity::kNote, "", "is tabulated: its tables are checked when imported"});
+    out.push_back(
+        {Severity::kNote, "", "is a table of another program: nothing here computes with it"});
     return out;
   }
   const Result<const ClothModel*> model = findClothModel(material.law);

@@ -128,7 +128,7 @@ SessionWriter::~SessionWriter() = default;
 Result<std::unique_ptr<SessionWriter>> SessionWriter::create(const fs::path& folder,
                                                              const SessionHeader& header) {
   const auto build = [&](const fs::path& scratch) { return buildSession(scratch, header); };
-  if (auto done = writeFolderAtomically(folder, "", build); !done) return done.error();
+  if (auto done = writeFolderAtomically(folder, FolderKind{}, build); !done) return done.error();
   const fs::path file = folder / format::kJournalFile;
   auto lock = lockJournal(file);
   if (!lock) return lock.error();

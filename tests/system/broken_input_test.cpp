@@ -96,6 +96,11 @@ std::vector<Broken> brokenFiles() {
        "line 1", "rise"},
       {"csv_pushed", "a.csv", "0,-1\n0.1,-2\n0.2,-3\n0.3,-4\n0.4,-5\n", importTensile("a.csv"),
        "a.csv", "positive"},
+      {"csv_kilonewtons_as_newtons", "a.csv", rows + "0.5,5e6\n", importTensile("a.csv"), "line 6",
+       "beyond"},
+      {"csv_colons", "a.csv", "0:1\n0.1:2\n", importTensile("a.csv"), "line 2", "1 columns"},
+      {"csv_control_characters", "a.csv", rows + std::string("0.5,6\0\x1b[2J7\n", 11),
+       importTensile("a.csv"), "line 6, column 2", "6??[2J7"},
       {"csv_binary", "a.csv", std::string("\0\1\2\3\n\4\5", 7), importTensile("a.csv"), "a.csv",
        "line"},
       {"csv_is_folder", "a.csv/x", "", importTensile("a.csv"), "a.csv", "folder"},
@@ -118,6 +123,9 @@ std::vector<Broken> brokenFiles() {
        "4 columns"},
       {"kes_name", "k.csv", "property,unit,../A\nEMT,%,5\n", importKes("k.csv"), "line 1", "../A"},
       {"kes_unit", "k.csv", "property,unit,A\nEMT,mm,5\n", importKes("k.csv"), "line 2", "mm"},
+      {"kes_decimals", "k.csv", "property;unit;A\nEMT;%;5,1\nLT;-;0.7\n", importKes("k.csv"),
+       "line 3, fabric A", "mixed"},
+      {"kes_units_row", "k.csv", "fabric,EMT\nA,5\n", importKes("k.csv"), "line 2", "unit"},
       {"kes_incomplete", "k.csv", "property,unit,A\nEMT,%,5\n", importKes("k.csv"), "k.csv",
        "missing"},
       {"material_truncated", "m.json", "{\"schema_version\": 1,", exportFrom("m.json"), "line 1",
@@ -217,6 +225,17 @@ TEST(BrokenFile, TheTablesStartFromAMaterialThatIsSound) {
   folder.write("m.json", material());
   EXPECT_EQ(tenter(checkMaterial("m.json"), folder.path()).exit_code, 0);
   EXPECT_EQ(tenter(exportFrom("m.json"), folder.path()).exit_code, 0);
+}
+
+TEST(BrokenFile, OneMeasurementGivenTwiceIsRefused) {
+  TemporaryFolder folder;
+  folder.write("a.csv", "0,1\n0.1,2\n0.2,3\n0.3,4\n0.4,5\n");
+  ASSERT_EQ(tenter(importTensile("a.csv"), folder.path()).exit_code, 0);
+  std::filesystem::rename(folder / "output", folder / "a");
+  std::filesystem::copy(folder / "a", folder / "b");
+  const Outcome outcome = tenter({"fit", "a", "b", "-o", "m.json"}, folder.path());
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("same numbers as a"));
 }
 
 TEST(Overwriting, RefusesWhatIsNotOurs) {

@@ -104,6 +104,20 @@ std::string sheetObj(int columns, int rows, double edge_m) {
   return out.str();
 }
 
+TEST(DrapeCommand, RefusesAnArcsimTableAndSaysWhy) {
+  TemporaryFolder folder;
+  folder.write("denim.json", kArcsim);
+  folder.write("sheet.obj", sheetObj(3, 3, 0.02));
+  ASSERT_EQ(tenter({"import", "arcsim", "denim.json", "-o", "MAT.json"}, folder.path()).exit_code,
+            0);
+  const Outcome outcome =
+      tenter({"drape", "sheet.obj", "--material", "MAT.json", "--fix", "0,1", "-o", "out.vtp"},
+             folder.path());
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("MAT.json: law"));
+  EXPECT_THAT(outcome.err, HasSubstr("no energy"));
+}
+
 TEST(DrapeCommand, HangsASheetAndCertifiesIt) {
   TemporaryFolder folder;
   folder.write("sheet.obj", sheetObj(10, 10, 0.02));

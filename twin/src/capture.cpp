@@ -87,9 +87,14 @@ Result<CaptureResult> captureMeasurement(const CaptureOptions& options) {
   return out;
 }
 
+const FolderKind& truthFolder() {
+  static const FolderKind kKind{"truth.json", "\"protocol\"", {"exact"}};
+  return kKind;
+}
+
 Result<void> writeTruth(const std::filesystem::path& folder, const CaptureTruth& truth) {
   return writeFolderAtomically(
-      folder, "truth.json", [&](const std::filesystem::path& inside) -> Result<void> {
+      folder, truthFolder(), [&](const std::filesystem::path& inside) -> Result<void> {
         if (auto done = writeMeasurement(inside / "exact", truth.exact); !done) return done;
         return writeFileAtomically(inside / "truth.json", truth.specimen.dump(2) + "\n");
       });

@@ -63,8 +63,9 @@ class CordRun {
   Result<CaptureRun> run() {
     if (auto built = build(); !built) return built.error();
     for (std::size_t i = 0; i < rig_.steps.size(); ++i) {
-      if (options_.cancelled && options_.cancelled()) return notConverged("cancelled");
-      if (!reach(rig_.steps[i])) {
+      const bool reached = !cancelled() && reach(rig_.steps[i]);
+      if (cancelled()) return notConverged("cancelled");
+      if (!reached) {
         return notConverged("the virtual cloth found no stable equilibrium in frame " +
                             std::to_string(i));
       }
@@ -140,7 +141,9 @@ class CordRun {
     return sum / cords;
   }
 
-  bool solve() { return findStableShape(*solver_, state_, run_.statistics); }
+  bool cancelled() const { return options_.cancelled && options_.cancelled(); }
+
+  bool solve() { return findStableShape(*solver_, state_, run_.statistics, options_.cancelled); }
 
   /// Moves one channel's actuators to `travel_m`, in smaller steps where one step fails.
   bool moveTo(int channel, double travel_m) {
@@ -149,6 +152,7 @@ class CordRun {
     for (int halvings = 0; halvings <= kMaxSubdivisions;) {
       setActuator(channel, at + step);
       if (!solve()) {
+        if (cancelled()) return false;
         step *= 0.5;
         ++halvings;
         ++run_.statistics.subdivisions;

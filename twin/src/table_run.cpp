@@ -48,12 +48,12 @@ class TableRun {
   Result<CaptureRun> run() {
     double done = 0.0;
     for (int i = 0; i < options_.frames; ++i) {
-      if (options_.cancelled && options_.cancelled()) return notConverged("cancelled");
       const double share =
           options_.frames > 1 ? static_cast<double>(i) / (options_.frames - 1) : 1.0;
       const double overhang = kFirstOverhang_m + share * (kLastOverhang_m - kFirstOverhang_m);
       double step = overhang - done;
       while (done < overhang - kSameLine_m) {
+        if (options_.cancelled && options_.cancelled()) return notConverged("cancelled");
         const double next = std::min(overhang, done + step);
         auto solved = push(next, next == overhang, i);
         if (!solved) return solved.error();
@@ -98,7 +98,7 @@ class TableRun {
     system->setClipPose(state, 0, pose);
 
     EquilibriumSolver solver(*system);
-    if (!findStableShape(solver, state, run_.statistics)) return false;
+    if (!findStableShape(solver, state, run_.statistics, options_.cancelled)) return false;
     remember(state.positions(system->sheet().nodeCount()), lines, edge);
     if (recorded) record(state.positions(system->sheet().nodeCount()), lines, edge, pose, frame);
     return true;

@@ -80,11 +80,13 @@ TriangleMesh trackedMesh(int per_side, bool on_bias) {
       .rest;
 }
 
-bool findStableShape(EquilibriumSolver& solver, ClothState& state, CaptureStatistics& statistics) {
+bool findStableShape(EquilibriumSolver& solver, ClothState& state, CaptureStatistics& statistics,
+                     const std::function<bool()>& cancelled) {
   constexpr int kMaxNewtonSteps = 300;  // frames take 5 to 18 on the average, snaps many times that
   const ClothState before = state;
   EquilibriumOptions options;
   options.max_iterations = kMaxNewtonSteps;
+  options.cancelled = cancelled;
   const EquilibriumSummary summary = solver.solve(state, options);
   statistics.newton_steps += summary.newton_steps;
   statistics.factorizations += summary.factorizations;

@@ -56,7 +56,8 @@ Result<CaptureRun> runTable(const CaptureOptions& options, const Fabric& specime
                             const ClothSource& cloth);
 
 /// Solves and counts the cost. True if `state` is now a converged, stable equilibrium; otherwise it
-/// is as it was.
-bool findStableShape(EquilibriumSolver& solver, ClothState& state, CaptureStatistics& statistics);
+/// is as it was. `cancelled` is polled between Newton steps.
+bool findStableShape(EquilibriumSolver& solver, ClothState& state, CaptureStatistics& statistics,
+                     const std::function<bool()>& cancelled = nullptr);
 
 }  // namespace tenter

@@ -212,6 +212,19 @@ TEST(CaptureTest, StopsWhenCancelled) {
   EXPECT_EQ(captureMeasurement(options).error().kind, ErrorKind::kNotConverged);
 }
 
+TEST(CaptureTest, StopsInTheMiddleOfAFrame) {
+  constexpr int kPolls = 5, kFewMore = 5;  // the first frame takes many more Newton steps
+  for (const char* protocol : {"complex-shear", "bend-weft"}) {
+    CaptureOptions options = smallCapture("satin-4", protocol);
+    int polls = 0, frames = 0;
+    options.cancelled = [&] { return ++polls > kPolls; };
+    options.progress = [&](int done, int) { frames = done; };
+    EXPECT_EQ(captureMeasurement(options).error().kind, ErrorKind::kNotConverged) << protocol;
+    EXPECT_LE(polls, kPolls + kFewMore) << protocol;
+    EXPECT_EQ(frames, 0) << protocol;
+  }
+}
+
 TEST(CaptureTest, TruthLiesInAFolderOfItsOwn) {
   const test_support::TemporaryFolder folder;
   const CaptureResult result = captured(smallCapture("knit-12", "bend-weft"));

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tenter/core/result.h"
 #include "tenter/core/types.h"
@@ -20,12 +21,23 @@ Result<std::string> readFile(const std::filesystem::path& file,
 /// of the folder.
 Result<void> writeFileAtomically(const std::filesystem::path& file, std::string_view content);
 
+/// Folders of one kind that this program writes, and may therefore replace. The default: none.
+struct FolderKind {
+  std::string marker;                ///< The file that makes a folder one of the kind ...
+  std::string marker_text;           ///< ... if it contains this near its beginning.
+  std::vector<std::string> entries;  ///< What else is in it; "*.json" stands for all so ending.
+};
+
+/// Whether `folder` may be made, or made anew: absent, empty, or of this kind and without anything
+/// that the kind does not have. Never the working folder nor one above it, which would be pulled
+/// away from under the user.
+Result<void> checkFolderReplaceable(const std::filesystem::path& folder, const FolderKind& kind);
+
 /// Builds a folder under a temporary name beside `folder` and renames it into place when `build`
-/// succeeds; removes it when `build` fails or throws. Refuses a `folder` that exists and is not
-/// empty, unless it carries `replaceable_marker` (a file name such as "measurement.json"), in which
-/// case the old one is swapped out.
+/// succeeds, where an older one of the kind is swapped out; removes it when `build` fails or
+/// throws. Refuses what checkFolderReplaceable refuses.
 Result<void> writeFolderAtomically(
-    const std::filesystem::path& folder, const std::string& replaceable_marker,
+    const std::filesystem::path& folder, const FolderKind& kind,
     const std::function<Result<void>(const std::filesystem::path&)>& build);
 
 /// Lower-case hexadecimal SHA-256.

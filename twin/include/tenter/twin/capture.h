@@ -17,6 +17,8 @@
 
 namespace tenter {
 
+struct FolderKind;
+
 /// A fitted model in the specimen's place, for tests of recovery: components in the registry's
 /// order.
 struct OwnLaw {
@@ -40,7 +42,7 @@ struct CaptureOptions {
   bool friction = true;                    ///< Internal friction of the cloth; never with own_law.
   std::optional<OwnLaw> own_law;           ///< With nodes = 25 the sheet is that of a fit.
   std::function<void(int, int)> progress;  ///< Frames done, frames in all.
-  std::function<bool()> cancelled;         ///< Polled between frames.
+  std::function<bool()> cancelled;         ///< Polled between Newton steps.
 };
 
 /// What nothing but tests and `evaluate --truth` may open.
@@ -65,6 +67,9 @@ struct CaptureResult {
 /// Equal options give equal results to the last bit, whatever the number of threads. Errors:
 /// unknown fabric or protocol, options out of range, kNotConverged naming the frame.
 Result<CaptureResult> captureMeasurement(const CaptureOptions& options);
+
+/// What tells a truth's folder from others.
+const FolderKind& truthFolder();
 
 /// truth.json and exact/ (a measurement folder). Complete or absent; replaces an older one.
 Result<void> writeTruth(const std::filesystem::path& folder, const CaptureTruth& truth);
