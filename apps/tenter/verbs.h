@@ -13,6 +13,7 @@ Verb materialVerb();
 Verb exportVerb();
 Verb drapeVerb();
 Verb calibrateVerb();
+Verb patternVerb();
 Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();
@@ -25,6 +26,7 @@ Verb twinServe();
 
 // Rows of `tenter calibrate`, calibrate_<name>.cpp.
 Verb camerasCalibration();
+Verb importedCalibration();
 
 // Kinds of import, one file each, import_<name>.cpp.
 Verb tensileImport();

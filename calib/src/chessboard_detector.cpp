@@ -153,19 +153,23 @@ std::optional<std::pair<int, int>> otherCornerCount(const ByteImage& image, cons
   constexpr double kSide_px = 800.0;
   constexpr int kReach = 2;
   const SearchImage search = reduced(viewOf(image), kSide_px);
-  // Larger boards first: a smaller one may be a part of what is there.
-  for (int more = 2 * kReach; more >= -2 * kReach; --more) {
+  // The nearest counts first: squares counted for corners, a row forgotten.
+  for (int distance = 1; distance <= 2 * kReach; ++distance) {
     for (int columns = -kReach; columns <= kReach; ++columns) {
-      const int rows = more - columns;
-      if (std::abs(rows) > kReach || (columns == 0 && rows == 0)) continue;
-      const cv::Size grid(board.columns + columns, board.rows + rows);
-      if (grid.width < 3 || grid.height < 3) continue;
-      // The same grid turned by a quarter is no other count.
-      if (grid.width == board.rows && grid.height == board.columns) continue;
-      std::vector<cv::Point2f> corners;
-      const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;
-      if (cv::findChessboardCorners(search.image, grid, corners, flags)) {
-        return std::pair(grid.width, grid.height);
+      for (int rows = -kReach; rows <= kReach; ++rows) {
+        if (std::abs(columns) + std::abs(rows) != distance) continue;
+        Board other = board;
+        other.columns += columns;
+        other.rows += rows;
+        // The same grid turned by a quarter is no other count.
+        const bool turned = other.columns == board.rows && other.rows == board.columns;
+        if (other.columns < 3 || other.rows < 3 || turned) continue;
+        std::vector<cv::Point2f> corners;
+        const cv::Size grid(other.columns, other.rows);
+        const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE;
+        if (!cv::findChessboardCorners(search.image, grid, corners, flags)) continue;
+        if (goesOn(search.image, other, corners)) continue;
+        return std::pair(other.columns, other.rows);
       }
     }
   }

@@ -26,13 +26,17 @@ double nearestNeighbour(int columns, const std::vector<cv::Point2f>& corners) {
 
 }  // namespace
 
-void refineGridCorners(const cv::Mat& image, int columns, std::vector<cv::Point2f>& corners) {
+void refineCorners(const cv::Mat& image, double half_window_px, std::vector<cv::Point2f>& corners) {
+  if (corners.empty()) return;
   const int half =
-      std::clamp(static_cast<int>(kWindowOfSpacing * nearestNeighbour(columns, corners)),
-                 kMinHalfWindow_px, kMaxHalfWindow_px);
+      std::clamp(static_cast<int>(half_window_px), kMinHalfWindow_px, kMaxHalfWindow_px);
   const cv::TermCriteria stop(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kMaxIterations,
                               kStop_px);
   cv::cornerSubPix(image, corners, cv::Size(half, half), cv::Size(-1, -1), stop);
+}
+
+void refineGridCorners(const cv::Mat& image, int columns, std::vector<cv::Point2f>& corners) {
+  refineCorners(image, kWindowOfSpacing * nearestNeighbour(columns, corners), corners);
 }
 
 }  // namespace tenter

@@ -12,4 +12,7 @@ namespace tenter {
 /// @param columns  of the grid; corners are row by row.
 void refineGridCorners(const cv::Mat& image, int columns, std::vector<cv::Point2f>& corners);
 
+/// The same with a window that is given, from 2 to 30 px to each side.
+void refineCorners(const cv::Mat& image, double half_window_px, std::vector<cv::Point2f>& corners);
+
 }  // namespace tenter
