@@ -10,10 +10,13 @@ packages=(
   # libraries
   libeigen3-dev libceres-dev libsuitesparse-dev libopenblas-pthread-dev libopenblas0-pthread libtbb-dev
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev libssl-dev libvtk9-dev zlib1g-dev libhdf5-dev
+  libopencv-dev
+  libopencv-contrib-dev libexpat1-dev
   # libraries that talk to devices
   libusb-1.0-0-dev libumockdev-dev umockdev libmodbus-dev libsystemd-dev
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-numpy python3-jsonschema
+  opencv-doc poppler-utils
   python3-usb usbutils mbpoll python3-pymodbus python3-serial-asyncio
   clang-16 libclang-rt-16-dev  # scripts/fuzz.sh
 )

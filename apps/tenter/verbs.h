@@ -12,6 +12,8 @@ Verb evaluateVerb();
 Verb materialVerb();
 Verb exportVerb();
 Verb drapeVerb();
+Verb calibrateVerb();
+Verb patternVerb();
 Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();
@@ -21,6 +23,10 @@ Verb versionVerb();
 
 // Rows of `tenter twin` that need devices, twin_<name>.cpp.
 Verb twinServe();
+
+// Rows of `tenter calibrate`, calibrate_<name>.cpp.
+Verb camerasCalibration();
+Verb importedCalibration();
 
 // Kinds of import, one file each, import_<name>.cpp.
 Verb tensileImport();
