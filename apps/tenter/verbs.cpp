@@ -7,8 +7,8 @@ namespace tenter::app {
 
 std::span<const Verb> verbs() {
   static const std::array kVerbs = {
-      importVerb(), fitVerb(),      evaluateVerb(), materialVerb(), exportVerb(),  drapeVerb(),
-      twinVerb(),   protocolVerb(), sessionVerb(),  demoVerb(),     versionVerb(),
+      importVerb(), fitVerb(),      evaluateVerb(), materialVerb(),  exportVerb(), drapeVerb(),
+      twinVerb(),   protocolVerb(), sessionVerb(),  correlateVerb(), demoVerb(),   versionVerb(),
 #ifdef TENTER_HARDWARE
       rigVerb(),
 #endif

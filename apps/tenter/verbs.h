@@ -16,6 +16,7 @@ Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();
 Verb rigVerb();
+Verb correlateVerb();
 Verb demoVerb();
 Verb versionVerb();
 
