@@ -18,6 +18,7 @@ Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();
 Verb rigVerb();
+Verb correlateVerb();
 Verb demoVerb();
 Verb versionVerb();
 

@@ -16,7 +16,7 @@ TEST(Usage, HelpListsEveryVerbAndExitsWithZero) {
   const Outcome help = tenter({"--help"}, folder.path());
   EXPECT_EQ(help.exit_code, 0);
   for (const char* verb : {"import", "fit", "evaluate", "material", "export", "drape", "twin",
-                           "protocol", "version"}) {
+                           "correlate", "protocol", "version"}) {
     EXPECT_THAT(help.out, HasSubstr(verb));
     EXPECT_EQ(tenter({verb, "--help"}, folder.path()).exit_code, 0) << verb;
   }
