@@ -7,7 +7,7 @@ namespace tenter::app {
 
 std::span<const Verb> verbs() {
   static const std::array kVerbs = {
-      importVerb(), fitVerb(),      evaluateVerb(), materialVerb(), exportVerb(),  drapeVerb(),
+      importVerb(), fitVerb(),      evaluateVerb(), materialVerb(), exportVerb(),  drapeVerb(),    invertVerb(),
       twinVerb(),   protocolVerb(), sessionVerb(),  demoVerb(),     versionVerb(),
 #ifdef TENTER_HARDWARE
       rigVerb(),

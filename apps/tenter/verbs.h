@@ -12,6 +12,7 @@ Verb evaluateVerb();
 Verb materialVerb();
 Verb exportVerb();
 Verb drapeVerb();
+Verb invertVerb();
 Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();

@@ -42,6 +42,8 @@ class InverseShell {
   const MeshTopology& topology() const { return topology_; }
   const ShellMaterial& material() const { return material_; }
 
+  void setGravity(const Vec3& gravity_m_per_s2) { material_.gravity_m_per_s2 = gravity_m_per_s2; }
+
   /// The pose's positions followed by the rotations.
   Eigen::VectorXd coordinates(const Points3& pose, const Eigen::VectorXd& rotations) const;
 
