@@ -138,10 +138,15 @@ BalanceResult ForceBalance::solve(RestUnknowns& u, const Points3* forces,
   Eigen::VectorXd r = residual(u, forces, &selection);
   const double to_weight = 1.0 / shell_.vertexCount();
   double square = r.squaredNorm(), damping = options.first_damping;
+  double last = std::numeric_limits<double>::infinity();
+  int slow = 0;
   for (;; ++out.iterations) {
     out.residual = std::sqrt(square) * to_weight;
     if (options.progress) options.progress(out.iterations, out.residual);
     out.converged = out.residual <= options.tolerance;
+    if (out.residual > options.worthwhile * last) ++slow; else slow = 0;
+    last = out.residual;
+    if (slow >= options.patience && !out.converged) return out;
     if (out.converged || out.iterations >= options.max_iterations ||
         (options.stop && options.stop()))
       return out;

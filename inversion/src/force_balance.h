@@ -29,9 +29,12 @@ struct BalanceSetup {
 
 struct BalanceOptions {
   int max_iterations = 100;
-  double tolerance = 3e-13;  ///< Of the total weight, 2-norm over all rows.
-  double first_damping = 1e-6;
+  double tolerance = 2e-12;  ///< Of the total weight, 2-norm over all rows.
+  double first_damping = 1e-12;
   double last_damping = 1e-15;
+  /// Gives up after `patience` iterations in a row that leave more than this share of the residual.
+  double worthwhile = 1.0;
+  int patience = 100;
   std::function<bool()> stop;
   std::function<void(int iteration, double residual)> progress;
 };

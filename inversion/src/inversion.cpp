@@ -4,7 +4,7 @@
 #include <chrono>
 #include <cstdio>
 
-#include "contact_load.h"
+#include "contact_forces.h"
 #include "force_balance.h"
 
 namespace tenter {
@@ -20,25 +20,45 @@ class Inverter {
   Result<InversionResult> run() {
     unknowns_.rest = problem_.target.positions;
     unknowns_.rotations = Eigen::VectorXd::Zero(shell_.rotationCount());
-    Points3 forces;
-    if (auto done = chooseForces(&forces); !done) return done.error();
     BalanceSetup setup;
     setup.fixed = problem_.fixed;
     setup.contacts = problem_.contacts;
     ForceBalance balance(shell_, problem_.target.positions, setup);
-    BalanceOptions o;
-    o.stop = [this] { return stopped(); };
-    o.progress = [this](int k, double r) { say("balance %.0f residual %.3g", double(k), r); };
-    balanced_ = balance.solve(unknowns_, &forces, o);
-    out_.factorizations += balanced_.factorizations;
-    if (!balanced_.converged && !problem_.contacts.empty()) {
-      balanced_ = balance.solve(unknowns_, nullptr, o);
-      out_.factorizations += balanced_.factorizations;
-    }
+    auto contact_forces = ContactForces::create(shell_, problem_.target.positions, setup);
+    if (!contact_forces) return contact_forces.error();
+    balanceForces(balance, *contact_forces);
     return finish(balance);
   }
 
  private:
+  void balanceForces(ForceBalance& balance, ContactForces& contact_forces) {
+    BalanceOptions o;
+    o.stop = [this] { return stopped(); };
+    o.progress = [this](int k, double r) { say("balance %.0f residual %.3g", double(k), r); };
+    BalanceOptions frozen = o;
+    frozen.worthwhile = 0.3;
+    frozen.patience = 2;
+    for (int outer = 0; outer < 12 && !stopped(); ++outer) {
+      const auto f = contact_forces.solve(balance.gradient(unknowns_), balance.setup(), o.stop);
+      out_.factorizations += f.factorizations;
+      say("contact load: converged %.0f after %.0f factorizations", f.converged ? 1.0 : 0.0, f.factorizations);
+      balanced_ = balance.solve(unknowns_, &f.forces, frozen);
+      out_.factorizations += balanced_.factorizations;
+      const RestUnknowns before = unknowns_;
+      const BalanceSetup strict = balance.setup();
+      balance.setup().friction_share = 0.5 * (1.0 + strict.friction_share);
+      balance.setup().offset = 0.5 * strict.offset;
+      BalanceOptions polish = o;
+      polish.worthwhile = 0.5;
+      polish.patience = 3;
+      balanced_ = balance.solve(unknowns_, nullptr, polish);
+      out_.factorizations += balanced_.factorizations;
+      balance.setup() = strict;
+      if (balanced_.converged) return;
+      unknowns_ = before;
+    }
+  }
+
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   bool stopped() const {
     return (options_.cancelled && options_.cancelled()) ||
@@ -49,39 +69,6 @@ class Inverter {
     char text[120];
     std::snprintf(text, sizeof text, format, a, b);
     options_.progress(text);
-  }
-
-  Result<void> chooseForces(Points3* forces) {
-    auto system = shell_.system(problem_.target.positions, problem_.fixed);
-    if (!system) return system.error();
-    const SparseLower& h = system->hessian(system->restState(), Projection::kNone);
-    Eigen::VectorXd gradient;
-    system->gradient(system->restState(), gradient);
-    std::vector<char> fixed(static_cast<std::size_t>(shell_.vertexCount()), 0);
-    for (const int v : problem_.fixed) fixed[v] = 1;
-    std::vector<int> dof(fixed.size(), -1);
-    int next = 0;
-    for (std::size_t v = 0; v < fixed.size(); ++v) {
-      if (fixed[v]) continue;
-      dof[v] = next;
-      next += 3;
-    }
-    std::vector<LoadCone> cones;
-    Eigen::VectorXd load = -gradient;
-    const double offset = 0.02 * shell_.weight_N(problem_.target.positions) / shell_.vertexCount();
-    for (const Contact& c : problem_.contacts) {
-      cones.push_back({dof[c.vertex], c.normal, 0.975 * c.friction});
-      load.segment<3>(dof[c.vertex]) += offset * c.normal;
-    }
-    SparseCholesky cholesky(h);
-    const ContactLoadResult r =
-        solveContactLoad(h, load, cones, cholesky, [this] { return stopped(); });
-    out_.factorizations += r.factorizations;
-    say("contact load: converged %.0f after %.0f factorizations", r.converged ? 1.0 : 0.0, r.factorizations);
-    *forces = r.forces;
-    for (std::size_t i = 0; i < cones.size(); ++i)
-      forces->col(static_cast<Eigen::Index>(i)) += offset * problem_.contacts[i].normal;
-    return {};
   }
 
   Result<InversionResult> finish(ForceBalance& balance) {
