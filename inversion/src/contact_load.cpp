@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "second_order_cone.h"
 
@@ -10,7 +11,11 @@ namespace tenter {
 namespace {
 
 constexpr int kMaxIterations = 80;
-constexpr double kTolerance = 1e-10;      ///< Of the load, and of the complementarity at the start.
+/// Of the load, and of the complementarity at the start. The cones are solved for with a margin, so
+/// no more is needed, and rounding allows no more where the contacts alone hold the shell.
+constexpr double kTolerance = 1e-7;
+constexpr double kUsable = 1e-4;  ///< What is still worth going on with.
+constexpr double kWorse = 100.0;
 constexpr double kToTheBoundary = 0.995;  ///< Share of the way to the cones' boundary in one step.
 constexpr double kLeastShift = 1e-13;     ///< Of the stiffest entry: H may be singular.
 
@@ -125,6 +130,9 @@ class Solver {
                                (c.scaling.w_inverse * (c.scaling.w_inverse * pull[i]));
     }
     cholesky_.solve(rhs, du_);
+    multiply(k_, du_, product_);  // one step of refinement: K is ill-conditioned near the end
+    cholesky_.solve(rhs - product_, correction_);
+    du_ += correction_;
     for (std::size_t i = 0; i < cones_.size(); ++i) {
       Cone& c = cones_[i];
       const Vec3 rz = c.s - c.from_motion * u_.segment<3>(c.dof);
@@ -147,21 +155,27 @@ class Solver {
     const double first_gap = std::max(gap(), 1e-300);
     const double load_size = std::max(load_.norm(), 1e-300);
     std::vector<Vec3> targets(cones_.size());
+    struct Best {
+      double error;
+      Eigen::VectorXd u;
+      std::vector<Cone> cones;
+    } best{std::numeric_limits<double>::infinity(), u_, cones_};
     for (int k = 0; k < kMaxIterations; ++k) {
       const Eigen::VectorXd rx = dualResidual();
       const double mu = gap();
-      if (!std::isfinite(mu) || !rx.allFinite()) return;
       double slack = 0.0;
       for (const Cone& c : cones_)
         slack = std::max(slack, (c.s - c.from_motion * u_.segment<3>(c.dof)).norm());
-      out->converged = rx.norm() <= kTolerance * load_size && mu <= kTolerance * first_gap &&
-                       slack <= kTolerance * std::max(u_.cwiseAbs().maxCoeff(), 1e-300);
-      if (out->converged || cones_.empty() || (stop && stop())) {
-        out->converged = out->converged || cones_.empty();
-        return;
-      }
+      const double error =
+          std::max({rx.norm() / load_size, mu / first_gap,
+                    slack / std::max(u_.cwiseAbs().maxCoeff(), 1e-300)});
+      if (!std::isfinite(error)) break;
+      if (error < best.error) best = {error, u_, cones_};
+      if (best.error <= kTolerance || cones_.empty() || (stop && stop())) break;
+      // Rounding has taken over.
+      if (best.error <= kUsable && error > kWorse * best.error) break;
       for (Cone& c : cones_) c.scaling = scaleCone(c.s, c.z);
-      if (!factorize(true)) return;
+      if (!factorize(true)) break;
       for (std::size_t i = 0; i < cones_.size(); ++i) {
         const Vec3& l = cones_[i].scaling.lambda;
         targets[i] = -coneProduct(l, l);
@@ -182,6 +196,11 @@ class Solver {
         c.z += step * c.dz;
       }
     }
+    out->converged = cones_.empty() || best.error <= kUsable;
+    if (out->converged) {
+      u_ = best.u;
+      cones_ = std::move(best.cones);
+    }
   }
 
   const SparseLower& h_;
@@ -189,7 +208,7 @@ class Solver {
   SparseCholesky& cholesky_;
   SparseLower k_;
   std::vector<Cone> cones_;
-  Eigen::VectorXd u_, du_;
+  Eigen::VectorXd u_, du_, product_, correction_;
   double shift_ = 0.0, start_weight_ = 1.0;
   int factorizations_ = 0;
 };
