@@ -60,7 +60,7 @@ int negativePivots(const SparseLower& h) {
   return static_cast<int>((factor.vectorD().array() < 0.0).count());
 }
 
-Result<void> measureStability(const ClothSystem& system, const ClothState& state,
+void measureStability(const ClothSystem& system, const ClothState& state,
                               Certificate& out) {
   EquilibriumSolver solver(system);
   ClothState copy = state;
@@ -72,7 +72,7 @@ Result<void> measureStability(const ClothSystem& system, const ClothState& state
   out.lambda_min_per_s2 = summary.lambda_min_per_s2;
   out.lambda_residual_per_s2 = summary.lambda_min_residual_per_s2;
   if (!summary.stable) out.negative_eigenvalues = negativePivots(system.hessian(state, Projection::kNone));
-  return {};
+  out.measured_stability = true;
 }
 
 ClothState perturbed(const ClothState& state, const std::vector<char>& held, double length_m,
@@ -124,8 +124,9 @@ bool redrape(const InverseShell& shell, const Points3& rest, const std::vector<i
             .maxCoeff() /
         out.size_m;
   });
+  if (stopped) return false;
   for (const double d : out.redrape_rel) out.redrape_max_rel = std::max(out.redrape_max_rel, d);
-  return !stopped;
+  return true;
 }
 
 void measureShape(const InverseShell& shell, const Points3& pose, const Points3& rest,
@@ -169,17 +170,14 @@ Result<Certificate> certify(const InverseShell& shell, const Points3& pose, cons
   measureForces(gradient, fixed, contacts, out);
   for (std::size_t i = 0; i < contacts.size(); ++i)
     if (out.contact_holds[i]) held.push_back(contacts[i].vertex);
+  if (options.stop && options.stop()) return out;
   auto system = shell.system(rest, held);
   if (!system) return system.error();
   ClothState state = system->restState();
   state.q = q;
-  if (auto done = measureStability(*system, state, out); !done) return done.error();
-  if (options.stop && options.stop()) return out;
-  if (!out.stable() || !out.balanced()) {  // nothing that a re-draping could add
-    out.redrape_max_rel = 1.0;
-    out.complete = true;
-    return out;
-  }
+  measureStability(*system, state, out);
+  // Of what is no stable equilibrium re-draping says nothing more.
+  if (!out.stable() || !out.balanced() || (options.stop && options.stop())) return out;
   out.complete = redrape(shell, rest, held, state, options, out);
   return out;
 }

@@ -67,12 +67,14 @@ class ForceBalance {
   Eigen::VectorXd keepingForces(const RestUnknowns& unknowns, const Eigen::MatrixXd& cuts,
                                 const Eigen::VectorXd& wanted);
 
+  /// u += scale * step.
+  static void move(RestUnknowns& u, const Eigen::VectorXd& step, double scale);
+
  private:
   Eigen::VectorXd residual(const RestUnknowns& unknowns, const Points3* forces,
                            std::vector<Mat3>* selection) const;
   void jacobian(const RestUnknowns& unknowns, const std::vector<Mat3>& selection);
   bool plausible(const Points3& rest) const;
-  static void move(RestUnknowns& u, const Eigen::VectorXd& step, double scale);
 
   InverseShell& shell_;
   Points3 pose_;

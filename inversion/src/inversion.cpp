@@ -1,16 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tenter/inversion/inversion.h"
 
+#include <array>
 #include <chrono>
 #include <cstdio>
+#include <limits>
+#include <utility>
 
 #include "contact_forces.h"
 #include "force_balance.h"
+#include "stabilize.h"
 
 namespace tenter {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+/// Shares of friction and least normal forces (in mean weights of a vertex) that cones are solved
+/// for: with room to spare first, then on their borders.
+struct Margin {
+  double friction_share, offset;
+};
+constexpr std::array kMargins{Margin{0.975, 0.02}, Margin{0.9999, 1e-4}};
+constexpr int kMaxOuter = 10;
+/// Another choice of forces has to be worth this share of the residual.
+constexpr double kWorthAnother = 0.7;
+/// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
+constexpr double kLambdaFloor_per_s2 = 0.05;
 
 class Inverter {
  public:
@@ -24,39 +40,75 @@ class Inverter {
     setup.fixed = problem_.fixed;
     setup.contacts = problem_.contacts;
     ForceBalance balance(shell_, problem_.target.positions, setup);
+    if (problem_.fixed.empty())
+      out_.proof = findSlidingProof(problem_.contacts, problem_.material.gravity_m_per_s2);
+    if (out_.proof) return finish(balance);
     auto contact_forces = ContactForces::create(shell_, problem_.target.positions, setup);
     if (!contact_forces) return contact_forces.error();
-    balanceForces(balance, *contact_forces);
+    for (const Margin& margin : kMargins) {
+      unknowns_.rest = problem_.target.positions;
+      unknowns_.rotations.setZero();
+      balance.setup().friction_share = margin.friction_share;
+      balance.setup().offset = margin.offset;
+      balanceForces(balance, *contact_forces);
+      if (balanced_.converged || stopped() || problem_.contacts.empty()) break;
+    }
+    if (balanced_.converged) makeStable(balance);
     return finish(balance);
   }
 
  private:
+  /// Alternates the convex choice of contact forces with rest shapes for these forces, then polishes
+  /// with cones that are a little wider, so that no force changes sides any more.
   void balanceForces(ForceBalance& balance, ContactForces& contact_forces) {
-    BalanceOptions o;
-    o.stop = [this] { return stopped(); };
-    o.progress = [this](int k, double r) { say("balance %.0f residual %.3g", double(k), r); };
-    BalanceOptions frozen = o;
+    BalanceOptions frozen;
+    frozen.stop = [this] { return stopped(); };
+    frozen.progress = [this](int k, double r) { say("forces given: %.0f, residual %.3g", k, r); };
     frozen.worthwhile = 0.3;
     frozen.patience = 2;
-    for (int outer = 0; outer < 12 && !stopped(); ++outer) {
-      const auto f = contact_forces.solve(balance.gradient(unknowns_), balance.setup(), o.stop);
+    BalanceOptions polish = frozen;
+    polish.progress = [this](int k, double r) { say("forces in cones: %.0f, residual %.3g", k, r); };
+    polish.worthwhile = 0.5;
+    polish.patience = 3;
+    double last = std::numeric_limits<double>::infinity();
+    for (int outer = 0; outer < kMaxOuter && !stopped(); ++outer) {
+      const auto f =
+          contact_forces.solve(balance.gradient(unknowns_), balance.setup(), frozen.stop);
       out_.factorizations += f.factorizations;
-      say("contact load: converged %.0f after %.0f factorizations", f.converged ? 1.0 : 0.0, f.factorizations);
-      balanced_ = balance.solve(unknowns_, &f.forces, frozen);
-      out_.factorizations += balanced_.factorizations;
+      say("contact forces chosen: %.0f, %.0f factorizations", f.converged ? 1.0 : 0.0,
+          f.factorizations);
+      if (!f.converged) return;
+      const BalanceResult r = balance.solve(unknowns_, &f.forces, frozen);
+      out_.factorizations += r.factorizations;
       const RestUnknowns before = unknowns_;
-      const BalanceSetup strict = balance.setup();
-      balance.setup().friction_share = 0.5 * (1.0 + strict.friction_share);
-      balance.setup().offset = 0.5 * strict.offset;
-      BalanceOptions polish = o;
-      polish.worthwhile = 0.5;
-      polish.patience = 3;
+      const BalanceSetup strict = widenCones(balance);
       balanced_ = balance.solve(unknowns_, nullptr, polish);
       out_.factorizations += balanced_.factorizations;
       balance.setup() = strict;
-      if (balanced_.converged) return;
+      if (balanced_.converged || r.residual > kWorthAnother * last) return;
+      last = r.residual;
       unknowns_ = before;
     }
+  }
+
+  static BalanceSetup widenCones(ForceBalance& balance) {
+    const BalanceSetup strict = balance.setup();
+    balance.setup().friction_share = 0.5 * (1.0 + strict.friction_share);
+    balance.setup().offset = 0.5 * strict.offset;
+    return strict;
+  }
+
+  void makeStable(ForceBalance& balance) {
+    const BalanceSetup strict = widenCones(balance);
+    StabilizeOptions o;
+    o.lambda_floor_per_s2 = kLambdaFloor_per_s2;
+    o.stop = [this] { return stopped(); };
+    o.progress = [this](int k, double l) { say("stability %.0f lambda_min %.4g", double(k), l); };
+    o.balance.stop = o.stop;
+    o.balance.max_iterations = 30;
+    const StabilizeResult r = stabilize(shell_, balance, unknowns_, o);
+    out_.factorizations += r.factorizations;
+    balance.setup() = strict;
   }
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
@@ -86,12 +138,16 @@ class Inverter {
     out_.seconds = seconds();
     if (out_.certificate.holds()) {
       out_.status = InversionStatus::kCertified;
+    } else if (out_.proof) {
+      out_.status = InversionStatus::kInfeasible;
+      out_.reason = "the shell slides off as a whole, whatever its rest shape";
     } else if (stopped()) {
       out_.status = InversionStatus::kBudget;
-      out_.reason = "time ran out";
+      out_.reason = options_.cancelled && options_.cancelled() ? "stopped" : "time ran out";
     } else {
-      out_.reason = out_.certificate.balanced() ? "the equilibrium that was found is not stable"
-                                                : "forces could not be balanced";
+      out_.reason = !out_.certificate.balanced() ? "no rest shape was found that balances the forces"
+                    : !out_.certificate.stable() ? "the equilibrium that was found is not stable"
+                                                 : "a perturbed shell does not return to the target";
     }
     return out_;
   }

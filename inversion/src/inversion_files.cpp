@@ -15,6 +15,19 @@ constexpr int kHistogramBins = 10;
 
 nlohmann::json vectorJson(const Vec3& v) { return {v[0], v[1], v[2]}; }
 
+nlohmann::json numberOrNull(bool known, double value) {
+  return known && std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
+}
+
+nlohmann::json proofJson(const InversionResult& result) {
+  if (!result.proof) return nullptr;
+  const SlidingProof& p = *result.proof;
+  return {{"kind", "sliding"},
+          {"direction", vectorJson(p.direction)},
+          {"work_per_mass_m_per_s2", p.work_per_mass},
+          {"friction_factor_min", numberOrNull(true, p.friction_factor_min)}};
+}
+
 nlohmann::json contactsJson(const InversionProblem& problem, const InversionResult& result) {
   nlohmann::json list = nlohmann::json::array();
   for (std::size_t i = 0; i < problem.contacts.size(); ++i) {
@@ -128,14 +141,16 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
           {"cone_violations", c.cone_violations},
           {"cone_margin_min", c.cone_margin_min},
           {"cone_margin_histogram", histogram(c.cone_margins)},
-          {"lambda_min_per_s2", c.lambda_min_per_s2},
-          {"lambda_min_residual_per_s2", c.lambda_residual_per_s2},
-          {"negative_eigenvalues", c.negative_eigenvalues},
-          {"redrape_rel", c.redrape_rel},
-          {"redrape_max_rel", c.redrape_max_rel},
+          {"lambda_min_per_s2", numberOrNull(c.measured_stability, c.lambda_min_per_s2)},
+          {"lambda_min_residual_per_s2", numberOrNull(c.measured_stability, c.lambda_residual_per_s2)},
+          {"negative_eigenvalues",
+           c.measured_stability ? nlohmann::json(c.negative_eigenvalues) : nlohmann::json()},
+          {"redrape_rel", c.complete ? nlohmann::json(c.redrape_rel) : nlohmann::json()},
+          {"redrape_max_rel", numberOrNull(c.complete, c.redrape_max_rel)},
           {"stretch_min", c.stretch.minCoeff()},
           {"stretch_max", c.stretch.cwiseAbs().maxCoeff()},
           {"bend_max_rad", c.bend_rad.maxCoeff()},
+          {"proof", proofJson(result)},
           {"seconds", result.seconds},
           {"factorizations", result.factorizations},
           {"provenance", provenance}};

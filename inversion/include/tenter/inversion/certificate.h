@@ -33,11 +33,12 @@ struct Certificate {
   Eigen::VectorXd stretch;  ///< (L_rest - L) / L of every edge.
   Eigen::VectorXd bend_rad;  ///< |theta_rest - theta| of every edge; 0 on the border.
   double size_m = 0.0;
-  bool complete = false;  ///< Every quantity was computed.
+  bool measured_stability = false;  ///< Whether lambda_min and the inertia were computed.
+  bool complete = false;            ///< Every quantity was computed.
 
   bool balanced() const { return force_residual_rel <= kForceResidualBound && cone_violations == 0; }
   bool stable() const {
-    return negative_eigenvalues == 0 && lambda_min_per_s2 > 0.0 &&
+    return measured_stability && negative_eigenvalues == 0 && lambda_min_per_s2 > 0.0 &&
            lambda_min_per_s2 >= kLambdaOverResidual * lambda_residual_per_s2;
   }
   bool holds() const {

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tenter/inversion/certificate.h"
+#include "tenter/inversion/sliding_proof.h"
 
 namespace tenter {
 
@@ -40,6 +42,7 @@ struct InversionResult {
   Eigen::VectorXd rotations;
   Points3 contact_forces;  ///< 3 x contacts [N], on the shell.
   Certificate certificate;
+  std::optional<SlidingProof> proof;  ///< Of kInfeasible.
   double seconds = 0.0;
   int factorizations = 0;
 };
