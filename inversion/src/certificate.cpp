@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <numbers>
 #include <random>
 
@@ -73,6 +75,30 @@ void measureStability(const ClothSystem& system, const ClothState& state,
   out.lambda_residual_per_s2 = summary.lambda_min_residual_per_s2;
   if (!summary.stable) out.negative_eigenvalues = negativePivots(system.hessian(state, Projection::kNone));
   out.measured_stability = true;
+}
+
+/// Where contacts and supports hold every vertex only edge rotations are free, and they carry no
+/// mass: stable if their own stiffness is positive, with no eigenvalue to speak of.
+void certifyHeld(const ClothSystem& system, const Eigen::VectorXd& q, int positions,
+                 Certificate& out) {
+  ClothState state = system.restState();
+  state.q = q;
+  SparseLower h = system.hessian(state, Projection::kNone);
+  const int first = h.size - (static_cast<int>(q.size()) - positions);
+  SparseLower rotations;
+  rotations.size = h.size - first;
+  rotations.column_begin.push_back(0);
+  for (int c = first; c < h.size; ++c) {
+    for (int k = h.column_begin[c]; k < h.column_begin[c + 1]; ++k) {
+      rotations.row.push_back(h.row[k] - first);
+      rotations.value.push_back(h.value[k]);
+    }
+    rotations.column_begin.push_back(static_cast<int>(rotations.row.size()));
+  }
+  out.negative_eigenvalues = rotations.size > 0 ? negativePivots(rotations) : 0;
+  out.lambda_min_per_s2 = std::numeric_limits<double>::infinity();
+  out.measured_stability = true;
+  out.complete = true;
 }
 
 ClothState perturbed(const ClothState& state, const std::vector<char>& held, double length_m,
@@ -171,6 +197,11 @@ Result<Certificate> certify(const InverseShell& shell, const Points3& pose, cons
   for (std::size_t i = 0; i < contacts.size(); ++i)
     if (out.contact_holds[i]) held.push_back(contacts[i].vertex);
   if (options.stop && options.stop()) return out;
+  if (static_cast<int>(held.size()) == shell.vertexCount()) {
+    certifyHeld(*all_free, q, 3 * shell.vertexCount(), out);
+    out.redrape_rel.assign(static_cast<std::size_t>(options.redrapes), 0.0);
+    return out;
+  }
   auto system = shell.system(rest, held);
   if (!system) return system.error();
   ClothState state = system->restState();

@@ -53,7 +53,9 @@ class Inverter {
       balanceForces(balance, *contact_forces);
       if (balanced_.converged || stopped() || problem_.contacts.empty()) break;
     }
-    if (balanced_.converged) makeStable(balance);
+    const bool all_held = problem_.fixed.size() + problem_.contacts.size() ==
+                          static_cast<std::size_t>(shell_.vertexCount());
+    if (balanced_.converged && !all_held) makeStable(balance);
     return finish(balance);
   }
 
@@ -64,12 +66,12 @@ class Inverter {
     BalanceOptions frozen;
     frozen.stop = [this] { return stopped(); };
     frozen.progress = [this](int k, double r) { say("forces given: %.0f, residual %.3g", k, r); };
-    frozen.worthwhile = 0.3;
-    frozen.patience = 2;
+    frozen.worthwhile = 0.9;
+    frozen.patience = 3;
     BalanceOptions polish = frozen;
     polish.progress = [this](int k, double r) { say("forces in cones: %.0f, residual %.3g", k, r); };
-    polish.worthwhile = 0.5;
-    polish.patience = 3;
+    polish.worthwhile = 0.9;
+    polish.patience = 4;
     double last = std::numeric_limits<double>::infinity();
     for (int outer = 0; outer < kMaxOuter && !stopped(); ++outer) {
       const auto f =
