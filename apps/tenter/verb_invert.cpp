@@ -111,7 +111,7 @@ void tell(const Options& o, const InversionProblem& problem, const InversionResu
   for (const char* key :
        {"status", "reason", "force_residual_rel", "cone_violations", "cone_margin_min",
         "lambda_min_per_s2", "negative_eigenvalues", "redrape_max_rel", "seconds",
-        "factorizations", "stretch_max", "bend_max_rad", "proof"}) {
+        "factorizations", "stretch_max", "bend_max_rad", "load_balanced", "proof"}) {
     console.answer[key] = certificate.at(key);
   }
   const Certificate& c = r.certificate;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tenter/inversion/inversion.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -22,7 +23,9 @@ struct Margin {
   double friction_share, offset;
 };
 constexpr std::array kMargins{Margin{0.975, 0.02}, Margin{0.9999, 1e-4}};
-constexpr int kMaxOuter = 10;
+constexpr int kMaxOuter = 4;
+/// Of the load's steps, when all of it at once is too much.
+constexpr double kLoadShrink = 0.25, kLoadGrowth = 1.5, kLeastLoadStep = 0.01;
 /// Another choice of forces has to be worth this share of the residual.
 constexpr double kWorthAnother = 0.7;
 /// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
@@ -50,8 +53,8 @@ class Inverter {
       unknowns_.rotations.setZero();
       balance.setup().friction_share = margin.friction_share;
       balance.setup().offset = margin.offset;
-      balanceForces(balance, *contact_forces);
-      if (balanced_.converged || stopped() || problem_.contacts.empty()) break;
+      raiseLoad(balance, *contact_forces);
+      if (balanced_.converged || stopped() || problem_.contacts.empty() || load_ > 0.0) break;
     }
     const bool all_held = problem_.fixed.size() + problem_.contacts.size() ==
                           static_cast<std::size_t>(shell_.vertexCount());
@@ -60,6 +63,31 @@ class Inverter {
   }
 
  private:
+  /// Balances all of the weight at once if that can be done, otherwise in steps: without load the
+  /// target is its own rest shape, and each solution starts the next. `load_` is what was reached.
+  void raiseLoad(ForceBalance& balance, ContactForces& contact_forces) {
+    double step = 1.0;
+    load_ = 0.0;
+    while (!stopped()) {
+      const RestUnknowns before = unknowns_;
+      balance.setup().load = std::min(1.0, load_ + step);
+      say("load %.4g", balance.setup().load);
+      balanced_ = {};
+      balanceForces(balance, contact_forces);
+      if (balanced_.converged) {
+        load_ = balance.setup().load;
+        if (load_ >= 1.0) break;
+        step *= kLoadGrowth;
+        continue;
+      }
+      unknowns_ = before;
+      step *= kLoadShrink;
+      if (step < kLeastLoadStep) break;
+    }
+    balance.setup().load = 1.0;
+    balanced_.converged = load_ >= 1.0;
+  }
+
   /// Alternates the convex choice of contact forces with rest shapes for these forces, then polishes
   /// with cones that are a little wider, so that no force changes sides any more.
   void balanceForces(ForceBalance& balance, ContactForces& contact_forces) {
@@ -126,6 +154,7 @@ class Inverter {
   }
 
   Result<InversionResult> finish(ForceBalance& balance) {
+    out_.load_balanced = load_;
     out_.rest = unknowns_.rest;
     out_.rotations = unknowns_.rotations;
     out_.contact_forces = balance.contactForces(balance.gradient(unknowns_));
@@ -160,6 +189,7 @@ class Inverter {
   Clock::time_point start_ = Clock::now();
   RestUnknowns unknowns_;
   BalanceResult balanced_;
+  double load_ = 0.0;  ///< Share of gravity that is balanced.
   InversionResult out_;
 };
 

@@ -151,6 +151,7 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
           {"stretch_max", c.stretch.cwiseAbs().maxCoeff()},
           {"bend_max_rad", c.bend_rad.maxCoeff()},
           {"proof", proofJson(result)},
+          {"load_balanced", result.load_balanced},
           {"seconds", result.seconds},
           {"factorizations", result.factorizations},
           {"provenance", provenance}};

@@ -43,6 +43,9 @@ struct InversionResult {
   Points3 contact_forces;  ///< 3 x contacts [N], on the shell.
   Certificate certificate;
   std::optional<SlidingProof> proof;  ///< Of kInfeasible.
+  /// Share of gravity that was balanced. Below 1 the rest shape is that of a material 1 / this times
+  /// as stiff, whose stability was not looked at.
+  double load_balanced = 0.0;
   double seconds = 0.0;
   int factorizations = 0;
 };
