@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "interrupt.h"
+#include "material_options.h"
 #include "output_guard.h"
 #include "progress.h"
 #include "tenter/core/mesh_io.h"
@@ -22,23 +23,16 @@ constexpr std::string_view kOutputMarker = "\"displacement_m\"";
 constexpr double kLargeSheet_m = 20.0;
 
 struct Options {
-  std::string mesh, material, output, gravity = "0,0,-9.80665";
+  std::string mesh, output, gravity = "0,0,-9.80665";
+  MaterialOptions material;
   std::vector<std::string> fix;
-  double rho = 0.0, k_stretch = 0.0, k_bend = 0.0, tolerance_N = 0.0, time_budget_s = 0.0;
-  CLI::Option *rho_option = nullptr, *stretch_option = nullptr, *bend_option = nullptr;
+  double tolerance_N = 0.0, time_budget_s = 0.0;
   int max_iterations = 500;
 };
 
 void declare(CLI::App& command, Options& o) {
   command.add_option("mesh", o.mesh, "Sheet at rest: OBJ, PLY or VTP [m]")->required();
-  command.add_option("--material", o.material, "Material file");
-  o.rho_option = command.add_option("--rho", o.rho,
-                                    "Areal density [kg/m^2]; with --k-stretch and "
-                                    "--k-bend instead of a material");
-  o.stretch_option =
-      command.add_option("--k-stretch", o.k_stretch, "Stretching constant of [Inv18] eq. 9 [N/m]");
-  o.bend_option =
-      command.add_option("--k-bend", o.k_bend, "Bending constant of [Inv18] eq. 10 [N m]");
+  declareMaterial(command, o.material);
   command
       .add_option("--fix", o.fix,
                   "Vertices that stay: 0,99 (from 0), 4-17, box:x0,y0,z0,x1,y1,z1 [m]")
@@ -54,59 +48,21 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("-o,--output", o.output, "Draped sheet to write (VTP)")->required();
 }
 
-bool positive(double value) { return std::isfinite(value) && value > 0.0; }
-
-/// The two constants of [Inv18] as a material, so that both ways go on together.
-Result<Material> twoConstants(const Options& o) {
-  if (!positive(o.rho) || !positive(o.k_stretch) || !std::isfinite(o.k_bend) || o.k_bend < 0.0) {
-    return usageError("--rho and --k-stretch must be positive, --k-bend not negative");
-  }
-  Material material;
-  material.law = "edge-hinge";
-  material.areal_density_kg_per_m2 = o.rho;
-  const auto add = [&](const char* name, double value) {
-    MaterialComponent component;
-    component.name = name;
-    component.curve = StiffnessCurve::constant(value);
-    material.components.push_back(std::move(component));
-  };
-  add("edge_stretch", o.k_stretch);
-  add("hinge_bend", o.k_bend);
-  return material;
-}
-
-Result<Material> materialOf(const Options& o) {
-  const int given = static_cast<int>(o.rho_option->count() > 0) +
-                    static_cast<int>(o.stretch_option->count() > 0) +
-                    static_cast<int>(o.bend_option->count() > 0);
-  if (o.material.empty() ? given != 3 : given != 0) {
-    return usageError("give either --material, or all of --rho, --k-stretch and --k-bend");
-  }
-  if (o.material.empty()) return twoConstants(o);
-  auto material = readMaterial(o.material);
-  if (material.ok() && material->areal_density_kg_per_m2 <= 0.0) {
-    return badInput(o.material, "areal_density_kg_per_m2", "is missing, so the sheet has no weight",
-                    "write it into the material");
-  }
-  return material;
-}
-
 Result<ClothSystem> systemOf(const Options& o) {
   const auto gravity = parseNumbers(o.gravity, 3, "--gravity");
   if (!gravity) return gravity.error();
-  const auto material = materialOf(o);
+  const auto material = materialOf(o.material);
   if (!material) return material.error();
   const auto model = findClothModel(material->law);
   if (!model) {
     return badInput(
-        o.material, "law",
+        o.material.file, "law",
         "is " + material->law +
             ", whose tabulated forces belong to no energy, and a drape is a minimum of one",
-        "drape it in its own program, or fit a law of tenter to measurements of the "
-        "fabric");
+        "drape it in its own program, or fit a law of tenter to measurements of the fabric");
   }
   const auto laws = makeLaws(**model, *material);
-  if (!laws) return laws.error().in(o.material);
+  if (!laws) return laws.error().in(o.material.file);
   const auto file = readMesh(o.mesh);
   if (!file) return file.error();
   if (auto valid = validateMesh(file->mesh); !valid) return valid.error().in(o.mesh);

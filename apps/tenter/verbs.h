@@ -14,6 +14,7 @@ Verb exportVerb();
 Verb drapeVerb();
 Verb calibrateVerb();
 Verb patternVerb();
+Verb invertVerb();
 Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();

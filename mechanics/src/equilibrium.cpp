@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "smallest_eigenvalue.h"
-#include "sparse_cholesky.h"
+#include "tenter/mechanics/sparse_cholesky.h"
 
 namespace tenter {
 namespace {

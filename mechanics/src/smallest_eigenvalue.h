@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
-#include "sparse_cholesky.h"
+#include "tenter/mechanics/sparse_cholesky.h"
 
 namespace tenter {
 

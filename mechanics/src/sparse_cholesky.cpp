@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sparse_cholesky.h"
+#include "tenter/mechanics/sparse_cholesky.h"
 
 #include <cholmod.h>
 #include <dlfcn.h>

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "sparse_cholesky.h"
+#include "tenter/mechanics/sparse_cholesky.h"
 
 namespace tenter {
 namespace {

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tenter/inversion/certificate.h"
+#include "tenter/inversion/sliding_proof.h"
+
+namespace tenter {
+
+/// A target pose, what it is made of and what holds it.
+struct InversionProblem {
+  TriangleMesh target;
+  ShellMaterial material;
+  std::vector<MaterialFrame> frames;  ///< As InverseShell::create.
+  std::vector<int> fixed;             ///< Vertices that something holds, whatever the force.
+  std::vector<Contact> contacts;
+};
+
+enum class InversionStatus {
+  kCertified,
+  kInfeasible,    ///< Proved: no rest shape exists.
+  kNotConverged,  ///< None was found that the certificate holds for.
+  kBudget,        ///< Time ran out first.
+};
+std::string name(
+    InversionStatus status);  ///< "certified", "infeasible", "not_converged", "budget".
+
+struct InversionOptions {
+  double time_budget_s = 0.0;  ///< 0: none.
+  std::function<bool()> cancelled;
+  std::function<void(const std::string& stage)> progress;
+  int redrapes = 20;
+};
+
+struct InversionResult {
+  InversionStatus status = InversionStatus::kNotConverged;
+  std::string reason;  ///< One sentence without a full stop; empty if certified.
+  Points3 rest;
+  Eigen::VectorXd rotations;
+  Points3 contact_forces;  ///< 3 x contacts [N], on the shell.
+  Certificate certificate;
+  std::optional<SlidingProof> proof;  ///< Of kInfeasible.
+  /// Share of gravity that was balanced. Below 1 the rest shape is that of a material 1 / this
+  /// times as stiff, whose stability was not looked at.
+  double load_balanced = 0.0;
+  double seconds = 0.0;
+  int factorizations = 0;
+};
+
+/// Finds a rest shape whose stable equilibrium under gravity and the contacts' friction is the
+/// target [Inv18]. Error kBadInput: the mesh is invalid, nothing holds it, the material does not
+/// fit.
+Result<InversionResult> invert(const InversionProblem& problem, const InversionOptions& options);
+
+}  // namespace tenter

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "tenter/inversion/inversion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "shell_samples.h"
+#include "tenter/core/files.h"
+#include "tenter/core/mesh_io.h"
+#include "tenter/inversion/inversion_files.h"
+#include "tenter/mechanics/equilibrium.h"
+#include "tenter/test_support/data.h"
+#include "tenter/test_support/json_schema.h"
+#include "tenter/test_support/temporary_folder.h"
+
+namespace tenter {
+namespace {
+
+using test::shellMaterial;
+
+/// The two constants of [Inv18] at its reference, times `factor`.
+ShellMaterial reference(double factor = 1.0) {
+  const ClothModel* model = findClothModel("edge-hinge").value();
+  std::vector<ComponentCurve> curves(2);
+  curves[0].curve = StiffnessCurve::constant(3.0 * factor);
+  curves[1].curve = StiffnessCurve::constant(5e-3 * factor);
+  return {model, makeLaws(*model, curves), 0.1, kDefaultGravity};
+}
+
+/// A half cylinder that stands on its two long edges, with uv.
+TriangleMesh arch(int n) {
+  TriangleMesh mesh = test::bentTarget(n, n);
+  const double radius = 1.0 / std::numbers::pi;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      const double a = std::numbers::pi * i / (n - 1);
+      mesh.positions.col(j * n + i) = Vec3(-radius * std::cos(a), double(j) / (n - 1),
+                                           i == 0 || i == n - 1 ? 0.0 : radius * std::sin(a));
+      mesh.uv.col(j * n + i) = Vec2(radius * a, double(j) / (n - 1));
+    }
+  }
+  return mesh;
+}
+
+InversionProblem standing(int n, ShellMaterial material, double friction = 0.4) {
+  InversionProblem problem;
+  problem.target = arch(n);
+  problem.material = std::move(material);
+  std::vector<std::unique_ptr<Obstacle>> floor;
+  floor.push_back(makeObstacle("plane:0,0,0,0,0,1").value());
+  problem.contacts = findContacts(problem.target, floor, {}, {friction, 1e-4}).value();
+  return problem;
+}
+
+void expectCertified(const Result<InversionResult>& result) {
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_EQ(result->status, InversionStatus::kCertified) << result->reason;
+  const Certificate& c = result->certificate;
+  EXPECT_LE(c.force_residual_rel, 1e-10);
+  EXPECT_EQ(c.cone_violations, 0);
+  EXPECT_GT(c.cone_margin_min, 0.0);
+  EXPECT_GT(c.lambda_min_per_s2, 0.0);
+  EXPECT_EQ(c.negative_eigenvalues, 0);
+  EXPECT_EQ(c.redrape_rel.size(), 20u);
+  EXPECT_LE(c.redrape_max_rel, 1e-6);
+}
+
+TEST(InversionTest, AnArchStandsOnFrictionAlone) {
+  expectCertified(invert(standing(10, reference(2.0)), {}));
+}
+
+TEST(InversionTest, WithoutInversionTheArchSags) {
+  const InversionProblem problem = standing(10, reference(2.0));
+  const InverseShell shell = InverseShell::create(problem.target, problem.material).value();
+  const auto c = certify(shell, problem.target.positions, problem.target.positions,
+                         Eigen::VectorXd(0), {}, problem.contacts, {});
+  ASSERT_TRUE(c.ok());
+  EXPECT_FALSE(c->balanced());
+  EXPECT_FALSE(c->holds());
+}
+
+TEST(InversionTest, FixedVerticesMayPull) {
+  InversionProblem problem = standing(10, reference(2.0));
+  for (const Contact& c : problem.contacts) problem.fixed.push_back(c.vertex);
+  problem.contacts.clear();
+  expectCertified(invert(problem, {}));
+}
+
+TEST(InversionTest, MaterialsWithCurvesAndDirectionsAreFirstClass) {
+  for (const char* law : {"soft", "stvk", "stvk-coupled"}) {
+    SCOPED_TRACE(law);
+    expectCertified(invert(standing(8, shellMaterial(law, 20.0)), {}));
+  }
+}
+
+/// A sheet that lies on a plane of that slope.
+InversionProblem onSlope(double tangent, double friction) {
+  InversionProblem problem;
+  problem.target = test::bentTarget(5, 5);
+  const double angle = std::atan(tangent);
+  for (int v = 0; v < problem.target.vertexCount(); ++v) {
+    const Vec2 uv = problem.target.uv.col(v);
+    problem.target.positions.col(v) = Vec3(uv[0] * std::cos(angle), uv[1], uv[0] * std::sin(angle));
+    Contact c;
+    c.vertex = v;
+    c.normal = Vec3(-std::sin(angle), 0.0, std::cos(angle));
+    c.friction = friction;
+    problem.contacts.push_back(c);
+  }
+  problem.material = reference(10.0);
+  return problem;
+}
+
+TEST(InversionTest, ASheetSticksToASlopeUpToItsFrictionAndSlidesBeyond) {
+  for (const double share : {0.3, 0.97, 0.999}) {
+    const auto result = invert(onSlope(0.4 * share, 0.4), {});
+    ASSERT_TRUE(result.ok());
+    EXPECT_EQ(result->status, InversionStatus::kCertified) << share << result->reason;
+  }
+  const auto result = invert(onSlope(0.4 * 1.001, 0.4), {});
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->status, InversionStatus::kInfeasible);
+  ASSERT_TRUE(result->proof);
+  EXPECT_NEAR(result->proof->friction_factor_min, 1.001, 1e-4);
+}
+
+TEST(InversionTest, WhatIsTooSoftIsNeverCalledGood) {
+  for (const double factor : {0.5, 1.0 / 16, 1.0 / 64}) {
+    InversionOptions options;
+    options.time_budget_s = 1.0;
+    const auto result = invert(standing(8, reference(factor)), options);
+    ASSERT_TRUE(result.ok());
+    EXPECT_NE(result->status, InversionStatus::kInfeasible) << "nothing proves that";
+    EXPECT_EQ(result->status == InversionStatus::kCertified, result->certificate.holds());
+    EXPECT_TRUE(result->rest.allFinite());
+  }
+}
+
+TEST(InversionTest, NothingThatHoldsItIsAnError) {
+  InversionProblem problem = standing(5, reference());
+  problem.contacts.clear();
+  EXPECT_FALSE(invert(problem, {}).ok());
+}
+
+TEST(InversionTest, FilesAgreeWithTheSchemaAndReadBack) {
+  const InversionProblem problem = standing(7, reference(2.0));
+  const auto result = invert(problem, {});
+  expectCertified(result);
+  test_support::TemporaryFolder folder;
+  ASSERT_TRUE(writeInversion(folder / "out", problem, *result, {{"program", "test"}}).ok());
+  EXPECT_EQ(test_support::listFolder(folder / "out"),
+            (std::vector<std::string>{"certificate.json", "contacts.vtp", "pose.vtp", "rest.obj",
+                                      "strains.vtp"}));
+  const auto json = nlohmann::json::parse(test_support::slurp(folder / "out/certificate.json"));
+  EXPECT_EQ(test_support::schemaErrors(
+                json, test_support::sourceFolder() / "docs/formats/certificate.schema.json"),
+            std::vector<std::string>{});
+  const auto rest = readMesh(folder / "out/rest.obj");
+  ASSERT_TRUE(rest.ok());
+  EXPECT_EQ(rest->mesh.positions, result->rest);
+  // Without re-running anything: the file's own numbers balance the weight.
+  Vec3 sum = Vec3::Zero();
+  for (const auto& c : json.at("contacts"))
+    for (int k = 0; k < 3; ++k)
+      sum[k] += c.at("force_N")[static_cast<std::size_t>(k)].get<double>();
+  EXPECT_NEAR(sum[2], json.at("weight_N").get<double>(), 1e-9 * sum[2]);
+  EXPECT_NEAR(sum.head<2>().norm(), 0.0, 1e-9 * sum[2]);
+}
+
+}  // namespace
+}  // namespace tenter
