@@ -19,12 +19,19 @@ struct Options {
 };
 
 void declare(CLI::App& command, Options& o) {
-  command.add_option("--fabric", o.rig.fabric, "One of `tenter twin fabrics`")->required();
+  command.add_option("--fabric", o.rig.mount.fabric, "One of `tenter twin fabrics`")->required();
   command.add_option("--state", o.state, "Folder for rig.toml")->required();
   command.add_option("--modbus", o.modbus, "How the load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
-  command.add_option("--seed", o.rig.seed, "Of the cells' noise")->capture_default_str();
+  command.add_option("--protocol", o.rig.mount.protocol, "How the sample hangs")
+      ->capture_default_str();
+  command.add_option("--seed", o.rig.mount.seed, "Of the cells' noise and of the specimen")
+      ->capture_default_str();
+  command.add_option("--specimen", o.rig.mount.specimen, "Number of the piece; 0: as the seed")
+      ->capture_default_str();
+  command.add_option("--nodes", o.rig.mount.nodes, "Nodes a side of the simulated sheet")
+      ->capture_default_str();
 }
 
 /// The program anew, with what it takes to announce devices.
@@ -63,7 +70,7 @@ Result<int> serve(const Options& o, Console& console) {
                                    : command.c_str());
   std::fflush(stdout);
   while (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  console.answer["served"] = o.rig.fabric;
+  console.answer["served"] = o.rig.mount.fabric;
   return kDone;
 }
 

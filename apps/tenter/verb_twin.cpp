@@ -115,7 +115,7 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
 Verb twinVerb() {
   static const std::array kRows = {
 #ifdef TENTER_HARDWARE
-      twinServe(),
+      twinServe(), twinTruth(),
 #endif
       Verb{"fabrics", "Names of the virtual fabrics",
            [](CLI::App& c, Action& a) {

@@ -21,6 +21,7 @@ Verb versionVerb();
 
 // Rows of `tenter twin` that need devices, twin_<name>.cpp.
 Verb twinServe();
+Verb twinTruth();
 
 // Kinds of import, one file each, import_<name>.cpp.
 Verb tensileImport();
