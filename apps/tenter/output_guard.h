@@ -17,6 +17,8 @@ Result<void> checkOutputFile(const std::filesystem::path& file, std::string_view
 Result<void> checkMaterialOutput(const std::filesystem::path& file);
 /// Error if the folder holds something but not the file `marker`, or is no folder.
 Result<void> checkOutputFolder(const std::filesystem::path& folder, std::string_view marker);
+/// Error if the folder holds anything: what a rig has recorded is never replaced.
+Result<void> checkNewFolder(const std::filesystem::path& folder);
 
 /// Marks a folder as a measurement.
 inline constexpr std::string_view kMeasurementMarker = "measurement.json";

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
 #include <chrono>
-#include <fstream>
-#include <iterator>
 #include <thread>
 
+#include "device_preload.h"
 #include "interrupt.h"
 #include "tenter/twin/served_rig.h"
 #include "verbs.h"
@@ -34,22 +32,10 @@ void declare(CLI::App& command, Options& o) {
       ->capture_default_str();
 }
 
-/// The program anew, with what it takes to announce devices.
-Result<void> preload() {
-  std::ifstream file("/proc/self/cmdline", std::ios::binary);
-  std::string all((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  std::vector<char*> arguments;
-  for (auto at = all.begin(); at != all.end(); at = std::next(std::find(at, all.end(), '\0'))) {
-    arguments.push_back(&*at);
-  }
-  arguments.push_back(nullptr);
-  return VirtualUsb::preload(arguments.data());
-}
-
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
 
 Result<int> serve(const Options& o, Console& console) {
-  if (auto ready = preload(); !ready) return ready.error();
+  if (auto ready = preloadDevices(); !ready) return ready.error();
   ServedRigOptions options = o.rig;
   options.state = o.state;
   options.tcp = o.modbus == "tcp";

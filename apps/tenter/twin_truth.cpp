@@ -45,10 +45,10 @@ Result<int> run(const Options& o, Console& console) {
   const auto mount = readMount(o.mount);
   if (!mount) return mount.error();
   Progress progress(console);
-  SessionTruthOptions options{o.session, *mount, interrupted, [&](double time_s) {
-                                progress.show(-1.0, std::to_string(static_cast<int>(time_s)) +
-                                                        " s of the session");
-                              }};
+  SessionTruthOptions options{
+      o.session, *mount, interrupted, [&](double time_s) {
+        progress.show(-1.0, std::to_string(static_cast<int>(time_s)) + " s of the session");
+      }};
   if (o.nodes != 0) options.mount.nodes = o.nodes;
   const auto truth = truthOfSession(options);
   if (!truth) return truth.error();
@@ -70,8 +70,8 @@ Result<int> run(const Options& o, Console& console) {
                                        {"largest_N", cord.largest_N},
                                        {"highest_N", cord.highest_N},
                                        {"way_m", cord.way_m}});
-    console.say(cord.axis + " (" + (cord.cord.empty() ? "no cord" : cord.cord) + "): " +
-                millinewtons(cord.rms_N) + " RMS, bias " + millinewtons(cord.bias_N));
+    console.say(cord.axis + " (" + (cord.cord.empty() ? "no cord" : cord.cord) +
+                "): " + millinewtons(cord.rms_N) + " RMS, bias " + millinewtons(cord.bias_N));
   }
   console.say("all: " + millinewtons(truth->rms_N) + " RMS of measured less friction, against " +
               "the specimen's truth");

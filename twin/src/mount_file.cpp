@@ -13,9 +13,8 @@ constexpr std::size_t kMaxFile_bytes = 65'536, kMaxName = 64;
 }  // namespace
 
 nlohmann::json mountToJson(const MountOptions& options) {
-  return {{"schema_version", 1},          {"fabric", options.fabric},
-          {"protocol", options.protocol}, {"seed", options.seed},
-          {"specimen", options.specimen}, {"nodes", options.nodes}};
+  return {{"schema_version", 1},  {"fabric", options.fabric},     {"protocol", options.protocol},
+          {"seed", options.seed}, {"specimen", options.specimen}, {"nodes", options.nodes}};
 }
 
 Result<MountOptions> readMount(const std::filesystem::path& file) {

@@ -78,8 +78,7 @@ void MountedSpecimen::Impl::assignActuators() {
 void MountedSpecimen::Impl::draw(const Positions& positions_m) {
   for (const Line& line : lines) {
     const double slack_m =
-        line.home_length_m -
-        sample->rig().clips[line.clip].cords[line.cord].cord.rest_length_m;
+        line.home_length_m - sample->rig().clips[line.clip].cords[line.cord].cord.rest_length_m;
     sample->draw(line.clip, line.cord, positions_m[line.axis] - slack_m);
   }
 }
@@ -90,8 +89,7 @@ bool MountedSpecimen::Impl::settle(const Positions& positions_m, bool foretell) 
   const ClothState before = sample->state();
   if (foretell) {
     Eigen::VectorXd way(lines.size());
-    for (const Line& line : lines)
-      way[line.axis] = positions_m[line.axis] - moment.at_m[line.axis];
+    for (const Line& line : lines) way[line.axis] = positions_m[line.axis] - moment.at_m[line.axis];
     sample->system().advance(sample->state(), dofs_by_position * way, 1.0);
   }
   CaptureStatistics cost;
@@ -173,7 +171,8 @@ Result<std::unique_ptr<MountedSpecimen>> MountedSpecimen::hang(const MountOption
   auto impl = std::make_unique<Impl>();
   impl->options = options;
   impl->line_of.fill(-1);
-  if (!(*protocol)->has_cords) return std::unique_ptr<MountedSpecimen>(new MountedSpecimen(std::move(impl)));
+  if (!(*protocol)->has_cords)
+    return std::unique_ptr<MountedSpecimen>(new MountedSpecimen(std::move(impl)));
   CaptureOptions capture;
   capture.protocol = options.protocol;
   capture.seed = options.seed;
@@ -236,9 +235,7 @@ double MountedSpecimen::Statistics::rmsError_N() const {
 }
 
 const MountedSpecimen::Moment& MountedSpecimen::moment() const { return impl_->moment; }
-const MountedSpecimen::Statistics& MountedSpecimen::statistics() const {
-  return impl_->statistics;
-}
+const MountedSpecimen::Statistics& MountedSpecimen::statistics() const { return impl_->statistics; }
 const MountOptions& MountedSpecimen::options() const { return impl_->options; }
 
 bool MountedSpecimen::hasCord(int axis) const {

@@ -67,9 +67,8 @@ class TruthRun {
       at[i] = *sample.positions_m[i];
     }
     const auto& solved = specimen_.moment().at_m;
-    const bool due = !std::equal(at.begin(), at.end(), solved.begin(), [](double a, double b) {
-      return std::abs(a - b) <= kDue_m;
-    });
+    const bool due = !std::equal(at.begin(), at.end(), solved.begin(),
+                                 [](double a, double b) { return std::abs(a - b) <= kDue_m; });
     if (due && !specimen_.follow(at)) return false;
     for (int i = 0; i < kAxes; ++i) {
       if (compares(i)) compare(i, at, sample.tensions, time_s);
@@ -114,8 +113,8 @@ class TruthRun {
       const auto n = static_cast<double>(sums.samples);
       out_.cords.push_back({header_.actuators[static_cast<std::size_t>(i)], specimen_.cordName(i),
                             sums.samples, std::sqrt(sums.squares / n),
-                            std::sqrt(sums.by_travel / n), sums.sum / n, sums.largest,
-                            sums.highest, sums.most_m - sums.least_m});
+                            std::sqrt(sums.by_travel / n), sums.sum / n, sums.largest, sums.highest,
+                            sums.most_m - sums.least_m});
       squares += sums.squares;
       by_travel += sums.by_travel;
       samples += n;

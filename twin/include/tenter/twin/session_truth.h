@@ -37,9 +37,9 @@ struct SessionTruth {
 
 struct SessionTruthOptions {
   std::filesystem::path session;
-  MountOptions mount;                   ///< As the session's rig was served.
-  std::function<bool()> cancelled;      ///< Polled often. May be empty.
-  std::function<void(double)> progress; ///< Seconds of the session done. May be empty.
+  MountOptions mount;                    ///< As the session's rig was served.
+  std::function<bool()> cancelled;       ///< Polled often. May be empty.
+  std::function<void(double)> progress;  ///< Seconds of the session done. May be empty.
 };
 
 /// Moves the specimen along the actuator positions that a session of the served rig recorded, by
