@@ -86,8 +86,7 @@ Result<void> RigVisit::enable() {
     if (!now) return now.error();
   }
   if (now->value("state", "") != "off") return {};
-  return Error{ErrorKind::kHardware, "", "", "the rig does not come up",
-               "see `tenter rig status`"};
+  return Error{ErrorKind::kHardware, "", "", "the rig does not come up", "see `tenter rig status`"};
 }
 
 Result<void> RigVisit::homeIfLost() {

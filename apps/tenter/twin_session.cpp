@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
 constexpr auto kPoll = 50ms;
-constexpr auto kStart = 20s;    // until the daemon listens
+constexpr auto kStart = 20s;     // until the daemon listens
 constexpr auto kFarewell = 40s;  // longer than the daemon takes to unload
 constexpr std::size_t kMaxFile_bytes = std::size_t{256} << 20;
 constexpr std::string_view kMount = "mount.json", kTruth = "truth.jsonl", kLog = "tenterd.log";

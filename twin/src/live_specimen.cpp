@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "live_specimen.h"
 
+#include <sched.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -34,6 +35,8 @@ bool isDue(const LiveSpecimen::Positions& from, const LiveSpecimen::Positions& t
 void yieldToOthers() {
   constexpr int kNicer = 5;
   const auto self = static_cast<id_t>(gettid());
+  const sched_param ordinary{};
+  sched_setscheduler(gettid(), SCHED_OTHER, &ordinary);  // though the program be real-time
   setpriority(PRIO_PROCESS, self, getpriority(PRIO_PROCESS, self) + kNicer);
 }
 
