@@ -86,4 +86,13 @@ Result<void> checkOutputFolder(const fs::path& folder, const FolderKind& kind) {
   return checkFolderReplaceable(folder, kind);
 }
 
+Result<void> checkNewFolder(const fs::path& folder) {
+  std::error_code error;
+  if (auto ok = checkPlace(folder); !ok) return ok.error();
+  if (!fs::exists(folder, error) ||
+      (fs::is_directory(folder, error) && fs::is_empty(folder, error)))
+    return {};
+  return badInput(folder.string(), "", "exists already", "choose another folder");
+}
+
 }  // namespace tenter::app

@@ -18,5 +18,7 @@ Result<void> checkOutputFile(const std::filesystem::path& file, std::string_view
 Result<void> checkMaterialOutput(const std::filesystem::path& file);
 /// Error if a folder of this kind cannot be put there, or would replace anything else.
 Result<void> checkOutputFolder(const std::filesystem::path& folder, const FolderKind& kind);
+/// Error if the folder holds anything: what a rig has recorded is never replaced.
+Result<void> checkNewFolder(const std::filesystem::path& folder);
 
 }  // namespace tenter::app

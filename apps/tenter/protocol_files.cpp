@@ -61,6 +61,15 @@ Result<int> check(const Options& o, Console& console) {
 
 }  // namespace
 
+Result<std::string> protocolText(const std::string& name) {
+  if (const ShippedFile* file = findShippedFile(shippedProtocols(), name)) {
+    return std::string(file->text);
+  }
+  const auto protocol = readCaptureProtocol(name);
+  if (!protocol) return protocol.error();
+  return protocol->text;
+}
+
 Verb protocolShow() {
   return {"show", "Print a shipped protocol",
           [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareShow, show); }};

@@ -5,6 +5,9 @@
 
 namespace tenter::app {
 
+/// A shipped protocol by its name, or a file that is one.
+Result<std::string> protocolText(const std::string& name);
+
 // What `tenter protocol` has on machines with devices.
 Verb protocolShow();
 Verb protocolCheck();

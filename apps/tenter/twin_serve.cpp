@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
 #include <chrono>
-#include <fstream>
-#include <iterator>
 #include <thread>
 
+#include "device_preload.h"
 #include "interrupt.h"
 #include "tenter/twin/served_rig.h"
 #include "verbs.h"
@@ -19,30 +17,25 @@ struct Options {
 };
 
 void declare(CLI::App& command, Options& o) {
-  command.add_option("--fabric", o.rig.fabric, "One of `tenter twin fabrics`")->required();
+  command.add_option("--fabric", o.rig.mount.fabric, "One of `tenter twin fabrics`")->required();
   command.add_option("--state", o.state, "Folder for rig.toml")->required();
   command.add_option("--modbus", o.modbus, "How the load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
-  command.add_option("--seed", o.rig.seed, "Of the cells' noise")->capture_default_str();
-}
-
-/// The program anew, with what it takes to announce devices.
-Result<void> preload() {
-  std::ifstream file("/proc/self/cmdline", std::ios::binary);
-  std::string all((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  std::vector<char*> arguments;
-  for (auto at = all.begin(); at != all.end(); at = std::next(std::find(at, all.end(), '\0'))) {
-    arguments.push_back(&*at);
-  }
-  arguments.push_back(nullptr);
-  return VirtualUsb::preload(arguments.data());
+  command.add_option("--protocol", o.rig.mount.protocol, "How the sample hangs")
+      ->capture_default_str();
+  command.add_option("--seed", o.rig.mount.seed, "Of the cells' noise and of the specimen")
+      ->capture_default_str();
+  command.add_option("--specimen", o.rig.mount.specimen, "Number of the piece; 0: as the seed")
+      ->capture_default_str();
+  command.add_option("--nodes", o.rig.mount.nodes, "Nodes a side of the simulated sheet")
+      ->capture_default_str();
 }
 
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
 
 Result<int> serve(const Options& o, Console& console) {
-  if (auto ready = preload(); !ready) return ready.error();
+  if (auto ready = preloadDevices(); !ready) return ready.error();
   ServedRigOptions options = o.rig;
   options.state = o.state;
   options.tcp = o.modbus == "tcp";
@@ -63,7 +56,7 @@ Result<int> serve(const Options& o, Console& console) {
                                    : command.c_str());
   std::fflush(stdout);
   while (!interrupted()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  console.answer["served"] = o.rig.fabric;
+  console.answer["served"] = o.rig.mount.fabric;
   return kDone;
 }
 

@@ -128,7 +128,7 @@ void tell(const Options& o, const InversionProblem& problem, const InversionResu
 }
 
 Result<int> run(const Options& o, Console& console) {
-  if (auto free = checkOutputFolder(o.output, kInversionMarker); !free) return free.error();
+  if (auto free = checkOutputFolder(o.output, inversionFolder()); !free) return free.error();
   const auto problem = problemOf(o);
   if (!problem) return problem.error();
   InversionOptions options;

@@ -1,17 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdio>
-#include <filesystem>
-#include <thread>
 
-#include "interrupt.h"
-#include "progress.h"
-#include "rig_client.h"
-#include "tenter/core/files.h"
-#include "tenter/rig/protocol.h"
-#include "tenter/rig/shipped_files.h"
+#include "protocol_files.h"
+#include "rig_visit.h"
 #include "verbs.h"
 
 namespace tenter::app {
@@ -20,9 +12,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr auto kPoll = std::chrono::milliseconds(200);
 constexpr double kMillimetre_m = 1e-3;
-constexpr int kInterlock = static_cast<int>(ErrorKind::kInterlock);
 
 struct Options {
   const CLI::Option* socket = nullptr;  ///< Of `tenter rig`, before or behind the verb.
@@ -92,113 +82,9 @@ Result<int> stop(const Options& o, Console& console) {
   return kDone;
 }
 
-/// One operator's visit: holds the lease while it lasts.
-class Visit {
- public:
-  static Result<std::unique_ptr<Visit>> begin(const Options& o, Console& console) {
-    auto client = RigClient::connect(o.socket->as<std::string>());
-    if (!client) return client.error();
-    if (auto lease = (*client)->call("lease"); !lease) return lease.error();
-    return std::unique_ptr<Visit>(new Visit(*std::move(client), console));
-  }
-
-  Result<Json> call(const std::string& method, const Json& params = Json::object()) {
-    return client_->call(method, params);
-  }
-
-  /// Until the rig rests; Ctrl-C aborts, and then it unloads. The last status.
-  Result<Json> wait(const std::string& what) {
-    for (bool aborted = false;;) {
-      std::this_thread::sleep_for(kPoll);
-      if (auto alive = call("heartbeat"); !alive) return alive.error();
-      auto now = call("status");
-      if (!now) return now.error();
-      if (interrupted() && !aborted) {
-        aborted = true;
-        (void)call("abort");  // refused where there is nothing to abort
-      }
-      progress_.show(-1.0, what + ", " + now->value("state", "") + forces(*now));
-      if (!now->value("moving", false) && now->value("state", "") != "paused") return now;
-    }
-  }
-
-  /// Out of "off": motors get current. That is this operator's own action. Then until the cells
-  /// give tensions that may be believed; what is amiss after some seconds the daemon will say.
-  Result<void> enable() {
-    auto now = call("status");
-    if (!now) return now.error();
-    const bool was_off = now->value("state", "") == "off";
-    if (was_off) {
-      if (auto done = call("enable"); !done) return done.error();
-    }
-    constexpr int kPatience = 20;
-    for (int i = 0; i < kPatience; ++i) {
-      if (now->value("state", "") != "off" && allRead(*now)) return {};
-      std::this_thread::sleep_for(kPoll);
-      if (auto alive = call("heartbeat"); !alive) return alive.error();
-      now = call("status");
-      if (!now) return now.error();
-    }
-    if (now->value("state", "") != "off") return {};
-    return Error{ErrorKind::kHardware, "", "", "the rig does not come up",
-                 "see `tenter rig status`"};
-  }
-
-  Result<void> homeIfLost() {
-    const auto now = call("status");
-    if (!now) return now.error();
-    bool lost = false;
-    for (const Json& axis : now->value("axes", Json::array())) {
-      lost = lost || !axis.value("homed", false);
-    }
-    if (!lost) return {};
-    if (auto done = call("home"); !done) return done.error();
-    const auto after = wait("homing");
-    if (!after) return after.error();
-    return {};
-  }
-
- private:
-  Visit(std::unique_ptr<RigClient> client, Console& console)
-      : client_(std::move(client)), progress_(console) {}
-
-  static bool allRead(const Json& now) {
-    const Json cells = now.value("cells", Json::array());
-    return std::all_of(cells.begin(), cells.end(),
-                       [](const Json& cell) { return cell.value("fault", "") == ""; });
-  }
-
-  static std::string forces(const Json& now) {
-    std::string text;
-    for (const Json& cell : now.value("cells", Json::array())) {
-      const Json force = cell.value("net_N", Json());
-      char number[16] = "     -";
-      if (force.is_number()) std::snprintf(number, sizeof number, " %5.2f", force.get<double>());
-      text += number;
-    }
-    return text + " N";
-  }
-
-  std::unique_ptr<RigClient> client_;
-  Progress progress_;
-};
-
-/// What the visit ended in: exit 7 if a limit or a person ended the motion, not if the rig is as
-/// halted as it was before.
-Result<int> ended(const Json& before, const Json& status, Console& console) {
-  const std::string state = status.value("state", "");
-  const std::string reason = status.value("reason", "");
-  console.answer["state"] = state;
-  console.answer["reason"] = reason;
-  console.say("the rig is " + state + (reason.empty() ? "" : " (" + reason + ")"));
-  const bool as_before = before.value("state", "") == state && before.value("reason", "") == reason;
-  const bool halted = (state == "fault" || state == "stopped") && !as_before;
-  return halted || interrupted() ? kInterlock : kDone;
-}
-
 Result<int> giveAndWait(const Options& o, Console& console, const std::string& method,
                         const Json& params = Json::object()) {
-  const auto visit = Visit::begin(o, console);
+  const auto visit = RigVisit::begin(o.socket->as<std::string>(), console);
   if (!visit) return visit.error();
   const bool needs_current = method != "disable";
   if (needs_current) {
@@ -211,7 +97,7 @@ Result<int> giveAndWait(const Options& o, Console& console, const std::string& m
   }
   const auto status = (*visit)->wait(method);
   if (!status) return status.error();
-  return ended(*before, *status, console);
+  return (*visit)->ended(*before, *status);
 }
 
 Result<int> jog(const Options& o, Console& console) {
@@ -221,43 +107,13 @@ Result<int> jog(const Options& o, Console& console) {
                       {"speed_m_per_s", o.speed_mm_per_s * kMillimetre_m}});
 }
 
-Result<std::string> protocolText(const std::string& name) {
-  if (const ShippedFile* file = findShippedFile(shippedProtocols(), name)) {
-    return std::string(file->text);
-  }
-  const auto protocol = readCaptureProtocol(name);
-  if (!protocol) return protocol.error();
-  return protocol->text;
-}
-
 Result<int> run(const Options& o, Console& console) {
   const auto text = protocolText(o.protocol);
   if (!text) return text.error();
-  const auto visit = Visit::begin(o, console);
+  const auto visit = RigVisit::begin(o.socket->as<std::string>(), console);
   if (!visit) return visit.error();
-  if (auto up = (*visit)->enable(); !up) return up.error();
-  if (auto homed = (*visit)->homeIfLost(); !homed) return homed.error();
-  const auto started = (*visit)->call(
-      "run", {{"protocol", *text},
-              {"session", std::filesystem::absolute(o.output).lexically_normal().string()},
-              {"fabric", o.fabric},
-              {"specimen", o.specimen},
-              {"who", o.who},
-              {"operator", o.operator_name},
-              {"areal_density_kg_per_m2", o.areal_density_kg_per_m2}});
-  if (!started) return started.error();
-  auto status = (*visit)->wait(o.protocol);
-  if (!status) return status.error();
-  constexpr int kPatience = 25;
-  for (int i = 0; i < kPatience && !status->at("session").value("closed", false); ++i) {
-    std::this_thread::sleep_for(kPoll);
-    status = (*visit)->call("status");
-    if (!status) return status.error();
-  }
-  console.answer["session"] = o.output;
-  const std::string fault = status->at("session").value("fault", "");
-  if (!fault.empty()) return Error{ErrorKind::kHardware, o.output, "", fault, ""};
-  return ended(Json::object(), *status, console);
+  return (*visit)->run({*text, o.protocol, o.output, o.fabric, o.specimen, o.who, o.operator_name,
+                        o.areal_density_kg_per_m2});
 }
 
 template <const char* kMethod>

@@ -7,6 +7,9 @@
 #include "progress.h"
 #include "tenter/core/measurement_folder.h"
 #include "tenter/twin/capture.h"
+#ifdef TENTER_HARDWARE
+#include "twin_session.h"
+#endif
 #include "verbs.h"
 
 namespace tenter::app {
@@ -32,7 +35,9 @@ Result<int> listFabrics(const NoOptions& /*options*/, Console& console) {
 struct CaptureCommand {
   CaptureOptions capture;
   std::string noise = "on", scatter = "on", friction = "on", diagonals = "uniform";
-  bool measurement = false;
+  bool measurement = false, session = false, through_daemon = false;
+  std::string modbus = "tcp";
+  int nodes = 0;
   std::string output, truth;
 };
 
@@ -40,15 +45,26 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
   const CLI::IsMember on_off({"on", "off"});
   command.add_option("--fabric", o.capture.fabric, "One of `tenter twin fabrics`")->required();
   command.add_option("--protocol", o.capture.protocol, "One of `tenter protocol list`")->required();
-  command.add_flag("--measurement", o.measurement, "Write a measurement, the input of a fit")
-      ->required();
-  command.add_option("-o,--output", o.output, "Folder of the measurement")->required();
+  CLI::Option_group* kind = command.add_option_group("what is written");
+  kind->require_option(1);
+  kind->add_flag("--measurement", o.measurement, "A measurement, the input of a fit");
+#ifdef TENTER_HARDWARE
+  kind->add_flag("--session", o.session, "A session, as the daemon records it");
+  command.add_flag("--through-daemon", o.through_daemon,
+                   "Through virtual devices and tenterd, in real time; sessions have no other way");
+  command.add_option("--modbus", o.modbus, "How a session's load cells are reached")
+      ->check(CLI::IsMember({"tcp", "rtu"}))
+      ->capture_default_str();
+#endif
+  command.add_option("-o,--output", o.output, "Folder of the measurement or session")->required();
   command.add_option("--truth", o.truth, "Folder for what a fit must not know");
   command.add_option("--seed", o.capture.seed, "Of noise and of the specimen")
       ->capture_default_str();
   command.add_option("--specimen", o.capture.specimen, "Number of the piece; 0: as the seed")
       ->capture_default_str();
-  command.add_option("--nodes", o.capture.nodes, "Nodes a side of the simulated sheet")
+  command
+      .add_option("--nodes", o.nodes,
+                  "Nodes a side of the simulated sheet; 0: 50 for a measurement, 25 for a session")
       ->capture_default_str();
   command.add_option("--frames", o.capture.frames, "Frames")->capture_default_str();
   command.add_option("--tracked", o.capture.tracked, "Tracked vertices a side")
@@ -67,7 +83,27 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
       ->capture_default_str();
 }
 
+#ifdef TENTER_HARDWARE
+Result<int> captureThroughDaemon(const CaptureCommand& command, Console& console) {
+  if (!command.through_daemon) {
+    return usageError("a session is recorded by the daemon: add --through-daemon");
+  }
+  SessionCapture session;
+  session.mount = {command.capture.fabric, command.capture.protocol, command.capture.seed,
+                   command.capture.specimen, MountOptions{}.nodes};
+  if (command.nodes != 0) session.mount.nodes = command.nodes;
+  session.tcp = command.modbus == "tcp";
+  session.output = command.output;
+  session.truth = command.truth;
+  return captureSession(session, console);
+}
+#endif
+
 Result<int> capture(const CaptureCommand& command, Console& console) {
+#ifdef TENTER_HARDWARE
+  if (command.session) return captureThroughDaemon(command, console);
+#endif
+  if (command.through_daemon) return usageError("--through-daemon makes a --session");
   if (auto free = checkOutputFolder(command.output, measurementFolder()); !free)
     return free.error();
   if (!command.truth.empty()) {
@@ -77,6 +113,7 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
     if (auto free = checkOutputFolder(command.truth, truthFolder()); !free) return free.error();
   }
   CaptureOptions options = command.capture;
+  if (command.nodes != 0) options.nodes = command.nodes;
   options.noise = command.noise == "on";
   options.scatter = command.scatter == "on";
   options.friction = options.cord_friction = command.friction == "on";
@@ -117,7 +154,7 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
 Verb twinVerb() {
   static const std::array kRows = {
 #ifdef TENTER_HARDWARE
-      twinServe(),
+      twinServe(), twinTruth(),
 #endif
       Verb{"fabrics", "Names of the virtual fabrics",
            [](CLI::App& c, Action& a) {

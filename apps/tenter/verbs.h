@@ -25,6 +25,7 @@ Verb versionVerb();
 
 // Rows of `tenter twin` that need devices, twin_<name>.cpp.
 Verb twinServe();
+Verb twinTruth();
 
 // Rows of `tenter calibrate`, calibrate_<name>.cpp.
 Verb camerasCalibration();

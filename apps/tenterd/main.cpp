@@ -2,7 +2,9 @@
 // tenterd: drives one rig and serves it on a Unix socket.
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/prctl.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <csignal>
@@ -47,10 +49,13 @@ int serve(const std::string& config_file, const std::string& socket, const std::
 int run(int argc, char** argv) {
   CLI::App app{"Drives a rig and serves it on a Unix socket", "tenterd"};
   std::string config, socket, group;
+  bool with_parent = false;
   app.add_option("--config", config, "The rig's configuration (docs/formats/rig.md)")->required();
   app.add_option("--socket", socket, "Unix socket to make; its clients are `tenter rig`")
       ->required();
   app.add_option("--group", group, "Group whose members may connect");
+  app.add_flag("--end-with-parent", with_parent,
+               "Unload and end when the program that started this one does; Ctrl-C is its own");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -64,6 +69,10 @@ int run(int argc, char** argv) {
   action.sa_handler = onSignal;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  if (with_parent) {
+    setpgid(0, 0);
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+  }
   return serve(config, socket, group);
 }
 

@@ -159,11 +159,18 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
       {"provenance", provenance}};
 }
 
+const FolderKind& inversionFolder() {
+  static const FolderKind kKind{"certificate.json",
+                                "\"bend_max_rad\"",
+                                {"rest.obj", "pose.vtp", "contacts.vtp", "strains.vtp"}};
+  return kKind;
+}
+
 Result<void> writeInversion(const std::filesystem::path& folder, const InversionProblem& problem,
                             const InversionResult& result, const nlohmann::json& provenance) {
-  return writeFolderAtomically(folder, kInversionMarker, [&](const std::filesystem::path& place) {
+  return writeFolderAtomically(folder, inversionFolder(), [&](const std::filesystem::path& place) {
     if (auto done = writeMeshes(place, problem, result); !done) return done;
-    return writeFileAtomically(place / kInversionMarker,
+    return writeFileAtomically(place / inversionFolder().marker,
                                certificateToJson(problem, result, provenance).dump(2) + "\n");
   });
 }

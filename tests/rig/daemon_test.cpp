@@ -30,11 +30,11 @@ name = "cycle"
 cycles = 2
 [[phase.step]]
 end = "force"
-force_N = 0.3
+force_N = 0.45
 limit_m = 0.03
 [[phase.step]]
 end = "force"
-force_N = 0.1
+force_N = 0.25
 limit_m = 0.03
 )";
 

@@ -16,7 +16,8 @@ constexpr double kLightBar_kg = 0.0101, kHeavyBar_kg = 0.0133, kCornerMass_kg = 
 constexpr double kReach_m = 0.12;         // clip to pulley at rest
 constexpr double kPulleyHeight_m = 0.02;  // so that slack cords lift the clips' weight
 constexpr double kTensionSpring_N_per_m =
-    500.0;                               // in every cord: forces then follow actuators smoothly
+    500.0;  // in every cord: forces then follow actuators smoothly
+constexpr double kHomeSlack_m = 0.004, kHomeTension_N = 0.1;
 constexpr double kHoldStretch_m = 0.04;  // in cords that only keep the sheet taut
 
 struct CordPlan {
@@ -27,13 +28,14 @@ struct CordPlan {
 };
 
 RigCord strung(const std::string& clip, const CordPlan& plan) {
-  RigCord out{clip + "/" + plan.name, {}, plan.channel};
+  RigCord out{clip + "/" + plan.name, {}, plan.channel, 0.0};
   out.cord.attachment_m = {plan.attachment_m.x(), plan.attachment_m.y(), 0.0};
   const Vec2 reach = kReach_m * plan.direction.normalized();
   out.cord.pulley_m = out.cord.attachment_m + Vec3(reach.x(), reach.y(), kPulleyHeight_m);
   const double length = (out.cord.pulley_m - out.cord.attachment_m).norm();
   out.cord.rest_length_m = length - plan.tension_N / plan.spring_N_per_m;
   out.cord.stiffness_N = plan.spring_N_per_m * out.cord.rest_length_m;
+  out.slack_m = std::max(kHomeSlack_m, (plan.tension_N - kHomeTension_N) / plan.spring_N_per_m);
   return out;
 }
 

@@ -18,6 +18,8 @@ struct RigCord {
   std::string id;
   ElasticCord cord;
   int channel = -1;  ///< -1: set once and left.
+  /// How much longer it is when its actuator of a served rig is at home.
+  double slack_m = 0.0;
 };
 
 struct RigClip {

@@ -4,16 +4,18 @@
 #include <algorithm>
 #include <sstream>
 
+#include "live_specimen.h"
 #include "tenter/core/files.h"
 #include "tenter/rig/shipped_files.h"
 #include "tenter/rig/tic_protocol.h"
-#include "tenter/twin/fabrics.h"
 
 namespace tenter {
 namespace {
 
 constexpr double kStart_units = 500.0;  // not at home: somebody has to find it
 constexpr double kTravel_m = 0.09;
+/// Clips hang on their cords at home too, and how much they pull there depends on what was before.
+constexpr double kSlackFactor = 1.25, kSlack_N = 0.05;
 constexpr const char* kMap = "laumas-tlb";
 
 std::string number(int index) { return std::to_string(index + 1); }
@@ -22,18 +24,27 @@ std::string serialOf(int index) { return "0000000" + number(index); }
 }  // namespace
 
 Result<std::unique_ptr<ServedRig>> ServedRig::start(const ServedRigOptions& options) {
-  const auto fabric = findFabric(options.fabric);
-  if (!fabric) return fabric.error();
-  std::unique_ptr<ServedRig> rig(new ServedRig(options));
-  rig->options_.state = std::filesystem::absolute(options.state);
-  rig->fabric_N_per_m_ = {(*fabric)->membrane.base_N_per_m[0], (*fabric)->membrane.base_N_per_m[1]};
   std::error_code failed;
-  std::filesystem::create_directories(rig->options_.state, failed);
+  std::filesystem::create_directories(options.state, failed);
   if (failed) return badInput(options.state.string(), "", failed.message());
+  auto specimen = MountedSpecimen::hang(options.mount);
+  if (!specimen) return specimen.error();
+  std::unique_ptr<ServedRig> rig(new ServedRig(options, *std::move(specimen)));
   if (auto served = rig->serve(); !served) return served.error();
-  auto written = writeFileAtomically(rig->configFile(), rig->configuration());
-  if (!written) return written.error();
+  const std::string mount = mountToJson(options.mount).dump(2) + "\n";
+  for (const auto& [file, text] : {std::pair(rig->options_.state / "mount.json", mount),
+                                   std::pair(rig->configFile(), rig->configuration())}) {
+    if (auto written = writeFileAtomically(file, text); !written) return written.error();
+  }
   return rig;
+}
+
+ServedRig::ServedRig(ServedRigOptions options, std::unique_ptr<MountedSpecimen> specimen)
+    : options_(std::move(options)) {
+  options_.state = std::filesystem::absolute(options_.state);
+  const auto& tensions_N = specimen->moment().tension_N;
+  home_N_ = *std::max_element(tensions_N.begin(), tensions_N.end());
+  specimen_ = std::make_unique<LiveSpecimen>(std::move(specimen), options_.state / "truth.jsonl");
 }
 
 ServedRig::~ServedRig() {
@@ -48,8 +59,8 @@ Result<void> ServedRig::serve() {
   for (int i = 0; i < kAxes; ++i) {
     VirtualCellOptions cell;
     cell.map = shared_map;
-    cell.force_N = [this, i] { return tension_N(i); };
-    cell.seed = options_.seed + static_cast<std::uint64_t>(i);
+    cell.force_N = [this, i] { return felt_N(i); };
+    cell.seed = options_.mount.seed + static_cast<std::uint64_t>(i);
     cells_.push_back(std::make_shared<VirtualCell>(cell));
     bus[i + 1] = cells_.back();
     if (!options_.tcp) continue;
@@ -79,24 +90,24 @@ Result<void> ServedRig::serve() {
   if (!usb) return usb.error();
   usb_ = *std::move(usb);
   usb_->observe([this](int device, const VirtualActuatorState& state) {
-    position_m_[static_cast<std::size_t>(device)] = state.position_units * kMetresPerMicrostep;
+    follow(device, state.position_units * kMetresPerMicrostep);
   });
   return {};
 }
 
-/// Two bars with two cords each on a sheet: cords in series with the sheet, and the difference of a
-/// bar's two cords turns the bar against the cords alone.
-double ServedRig::tension_N(int axis) const {
-  const int direction = axis / 4, first = 4 * direction, partner = axis ^ 1;
-  double drawn_m = -kSlack_m;
-  for (int i = 0; i < 4; ++i) drawn_m += 0.5 * position_m_[static_cast<std::size_t>(first + i)];
-  const double series_N_per_m =
-      1.0 / (1.0 / fabric_N_per_m_[static_cast<std::size_t>(direction)] + 1.0 / kCord_N_per_m);
-  const double bar_N = series_N_per_m * std::max(0.0, drawn_m);
-  const double turned_m =
-      position_m_[static_cast<std::size_t>(axis)] - position_m_[static_cast<std::size_t>(partner)];
-  const double cord_N = bar_N > 0.0 ? 0.5 * bar_N + 0.5 * kCord_N_per_m * 0.5 * turned_m : 0.0;
-  return std::max(0.0, cord_N) + added_N_[static_cast<std::size_t>(axis)];
+/// Devices are told one after the other; with the last of them the specimen moves.
+void ServedRig::follow(int device, double position_m) {
+  position_m_[static_cast<std::size_t>(device)] = position_m;
+  if (device != kAxes - 1) return;
+  MountedSpecimen::Positions all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = position_m_[i];
+  specimen_->moveTo(all);
+}
+
+double ServedRig::tension_N(int axis) const { return specimen_->tension_N(axis); }
+
+double ServedRig::felt_N(int axis) const {
+  return specimen_->felt_N(axis) + added_N_.at(static_cast<std::size_t>(axis));
 }
 
 void ServedRig::addForce(int cell, double force_N) {
@@ -105,9 +116,11 @@ void ServedRig::addForce(int cell, double force_N) {
 
 std::string ServedRig::configuration() const {
   std::ostringstream toml;
+  const double slack_N = kSlackFactor * home_N_ + kSlack_N;
   toml << "# SPDX-License-Identifier: CC0-1.0\nschema_version = 1\nname = \"virtual rig, "
-       << options_.fabric << "\"\n\n[limits]\nabsolute_N = 12.0\nworking_N = 10.0\n"
-       << "slack_N = 0.05\nslope_N_per_s = 60.0\nstiffest_sample_N_per_m = 1000.0\n"
+       << options_.mount.fabric << ", " << options_.mount.protocol
+       << "\"\n\n[limits]\nabsolute_N = 12.0\nworking_N = 10.0\n"
+       << "slack_N = " << slack_N << "\nslope_N_per_s = 60.0\nstiffest_sample_N_per_m = 1000.0\n"
        << "following_error_m = 0.001\n";
   for (int i = 0; i < kAxes; ++i) {
     const VirtualModbus& server = *servers_[options_.tcp ? static_cast<std::size_t>(i) : 0];

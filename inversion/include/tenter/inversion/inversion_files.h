@@ -4,13 +4,14 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "tenter/core/files.h"
 #include "tenter/inversion/inversion.h"
 
 namespace tenter {
 
 inline constexpr int kInversionSchemaVersion = 1;
-/// Marks a folder as an inversion result.
-inline constexpr const char* kInversionMarker = "certificate.json";
+/// The folder that writeInversion() makes.
+const FolderKind& inversionFolder();
 
 /// certificate.json (docs/formats/inversion.md). `provenance`: whatever the caller adds: file
 /// names, options, version.
