@@ -15,6 +15,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMmPerInch = 25.4;
+/// What PDFs and PNGs of this program say near their beginning.
+constexpr std::string_view kMaker = "Tenter";
 
 struct OutputOptions {
   std::string paper = "a4", output;
@@ -40,8 +42,7 @@ std::vector<fs::path> filesOf(const std::string& output) {
 
 Result<void> checkOutputs(const OutputOptions& o) {
   for (const fs::path& file : filesOf(o.output)) {
-    const std::string_view marker = file.extension() == ".pdf" ? "%PDF-" : "PNG\r\n";
-    if (auto ok = checkOutputFile(file, marker); !ok) return ok;
+    if (auto ok = checkOutputFile(file, kMaker); !ok) return ok;
   }
   return {};
 }

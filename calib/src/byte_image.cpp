@@ -102,7 +102,8 @@ std::string encodePng(const ByteImage& image, double pixels_per_m) {
   constexpr std::size_t kBehindHeader = 33;
   const auto density = bigEndian(static_cast<std::uint32_t>(std::lround(pixels_per_m)));
   std::string bytes(encoded.begin(), encoded.end());
-  bytes.insert(kBehindHeader, chunk("pHYs", density + density + '\1'));
+  const std::string maker = std::string("Software") + '\0' + "Tenter";
+  bytes.insert(kBehindHeader, chunk("pHYs", density + density + '\1') + chunk("tEXt", maker));
   return bytes;
 }
 

@@ -90,7 +90,7 @@ std::string pdfOf(const PrintPage& page) {
             std::to_string(image.height) + " /ColorSpace /DeviceGray /BitsPerComponent 8",
         bytes));
   }
-  std::string pdf = "%PDF-1.4\n", table = "0000000000 65535 f \n";
+  std::string pdf = "%PDF-1.4\n% Tenter\n", table = "0000000000 65535 f \n";
   for (std::size_t i = 0; i < objects.size(); ++i) {
     table += text("%010zu 00000 n \n", pdf.size());
     pdf += std::to_string(i + 1) + " 0 obj\n" + objects[i] + "\nendobj\n";
