@@ -106,8 +106,14 @@ std::string daemonProgram() {
   return !failed && fs::exists(beside) ? beside.string() : "tenterd";
 }
 
+const FolderKind& rigTruthFolder() {
+  static const FolderKind kKind{
+      std::string(kMount), "\"protocol\"", {std::string(kTruth), std::string(kLog)}};
+  return kKind;
+}
+
 Result<void> keepTruth(const StateFolder& state, const std::string& folder) {
-  return writeFolderAtomically(folder, std::string(kMount), [&](const fs::path& inside) {
+  return writeFolderAtomically(folder, rigTruthFolder(), [&](const fs::path& inside) {
     for (const std::string_view name : {kMount, kTruth, kLog}) {
       const auto text = readFile(state / name, kMaxFile_bytes);
       if (!text) return Result<void>(text.error());
@@ -135,7 +141,7 @@ Result<int> runProtocol(const SessionCapture& capture, const std::string& protoc
 Result<int> captureSession(const SessionCapture& capture, Console& console) {
   if (auto free = checkNewFolder(capture.output); !free) return free.error();
   if (!capture.truth.empty()) {
-    if (auto free = checkOutputFolder(capture.truth, kMount); !free) return free.error();
+    if (auto free = checkOutputFolder(capture.truth, rigTruthFolder()); !free) return free.error();
   }
   const auto protocol = protocolText(capture.mount.protocol);
   if (!protocol) return protocol.error();

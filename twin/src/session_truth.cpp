@@ -87,8 +87,9 @@ class TruthRun {
     if (specimen_.hasCord(axis)) {
       by_length_[i].follow(specimen_.cordLength_m(axis, at[i], truth_N));
       by_travel_[i].follow(kFarPulley_m - at[i]);
-      friction_N = by_length_[i].force_N();
-      travel_N = by_travel_[i].force_N();
+      // A cell does not feel less than nothing.
+      friction_N = std::max(by_length_[i].force_N(), -truth_N);
+      travel_N = std::max(by_travel_[i].force_N(), -truth_N);
     }
     if (i >= tensions.size() || tensions[i].status != TensionStatus::kOk || !tensions[i].tension_N)
       return;
