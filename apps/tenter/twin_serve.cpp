@@ -3,10 +3,11 @@
 #include <chrono>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <thread>
 
 #include "interrupt.h"
-#include "tenter/twin/served_rig.h"
+#include "tenter/twin/fault_player.h"
 #include "verbs.h"
 
 namespace tenter::app {
@@ -15,7 +16,7 @@ namespace {
 
 struct Options {
   ServedRigOptions rig;
-  std::string state, modbus = "tcp";
+  std::string state, modbus = "tcp", faults;
 };
 
 void declare(CLI::App& command, Options& o) {
@@ -24,6 +25,7 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--modbus", o.modbus, "How the load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
+  command.add_option("--fault", o.faults, "Script of faults (docs/formats/fault-script.md)");
   command.add_option("--seed", o.rig.seed, "Of the cells' noise")->capture_default_str();
 }
 
@@ -41,13 +43,28 @@ Result<void> preload() {
 
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
 
+/// Nothing without a script; what it does goes to faults.jsonl in the state folder.
+Result<std::unique_ptr<FaultPlayer>> play(std::optional<FaultScript> script, ServedRig& rig) {
+  if (!script) return std::unique_ptr<FaultPlayer>();
+  return FaultPlayer::start(rig, *std::move(script),
+                            rig.configFile().replace_filename("faults.jsonl"));
+}
+
 Result<int> serve(const Options& o, Console& console) {
+  std::optional<FaultScript> script;
+  if (!o.faults.empty()) {
+    auto read = readFaultScript(o.faults, ServedRig::kAxes, o.modbus == "tcp");
+    if (!read) return read.error();
+    script = *std::move(read);
+  }
   if (auto ready = preload(); !ready) return ready.error();
   ServedRigOptions options = o.rig;
   options.state = o.state;
   options.tcp = o.modbus == "tcp";
   const auto rig = ServedRig::start(options);
   if (!rig) return rig.error();
+  const auto player = play(std::move(script), **rig);
+  if (!player) return player.error();
   std::string command = "env";
   for (const std::string& variable : (*rig)->usb().environment()) command += " " + quoted(variable);
   const std::string config = (*rig)->configFile().string();

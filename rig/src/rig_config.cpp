@@ -5,11 +5,10 @@
 #include <map>
 #include <set>
 
-#include "register_map_toml.h"
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
 #include "tenter/rig/shipped_files.h"
-#include "toml_keys.h"
+#include "tenter/rig/toml_document.h"
 
 namespace tenter {
 namespace {
