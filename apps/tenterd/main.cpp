@@ -64,6 +64,8 @@ int run(int argc, char** argv) {
   action.sa_handler = onSignal;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  // A file that may not grow is a disk that is full: the write says so, and the rig unloads.
+  std::signal(SIGXFSZ, SIG_IGN);
   return serve(config, socket, group);
 }
 

@@ -102,7 +102,20 @@ void RigMachine::actJog() {
   move(velocities);
 }
 
+/// A switch that stays pressed would let its axis draw in without end, looking for where it is let
+/// go. A count that jumps to its zero at the end is no way.
+bool RigMachine::homesAstray(std::size_t axis) {
+  const AxisInput& input = axes_[axis];
+  if (!input.homing || !input.position_m) return false;
+  begun_m_[axis] = std::min(begun_m_[axis], *input.position_m);
+  return *input.position_m - begun_m_[axis] > config_.limits.following_error_m;
+}
+
 void RigMachine::actHome() {
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    if (!homesAstray(i)) continue;
+    return trip(config_.axes[i].device.name, "homing-astray", "does not leave its limit switch");
+  }
   if (seconds() < kHomeFirst_s) return;
   const bool done = std::all_of(axes_.begin(), axes_.end(), [](const AxisInput& axis) {
     return !axis.homing && axis.position_certain;
