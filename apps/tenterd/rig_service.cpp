@@ -225,7 +225,8 @@ RigTick RigService::readAll() {
     tick.cells.push_back(std::move(cell));
   }
   tick.time_ns = now_ns;
-  tick.operator_gone = !operated_ && !quitting_;
+  const bool changed = operator_changed_.exchange(false);
+  tick.operator_gone = (!operated_ || changed) && !quitting_;
   if (recorder_) tick.recorder_fault = recorder_->fault();
   return tick;
 }

@@ -41,6 +41,8 @@ class RigService {
   Result<void> command(RigCommand command, std::shared_ptr<Recorder> recorder = nullptr);
   /// Whether somebody holds the rig; without, what moves is ended.
   void setOperated(bool operated) { operated_ = operated; }
+  /// Somebody else holds it from now on: what moves is ended too.
+  void operatorChanged() { operator_changed_ = true; }
   nlohmann::json status() const;
   const RigConfig& config() const { return config_; }
 
@@ -78,7 +80,7 @@ class RigService {
   std::shared_ptr<CellEvents> cell_events_;
   std::unique_ptr<LoadCellScanner> scanner_;
   RigMachine machine_;
-  std::atomic<bool> quitting_{false}, operated_{false}, armed_{false};
+  std::atomic<bool> quitting_{false}, operated_{false}, armed_{false}, operator_changed_{false};
   /// A device did not confirm that it halted: it is told again, and not kept alive meanwhile.
   std::atomic<bool> halt_again_{false};
 

@@ -91,10 +91,11 @@ std::vector<FaultKindRow> makeKinds() {
   kinds.push_back(program("client-gone", 150, {"lease-lost"}, {kJog, kLoading, kHolding}));
   kinds.push_back(program("client-silent", 2300, {"lease-lost"}, {kJog, kLoading, kHolding}));
   kinds.push_back(program("lease-stolen", 0, {"operates the rig"}, kMotion));
+  kinds.push_back(program("lease-taken-over", 2300, {"lease-lost"}, {kJog, kLoading}));
   kinds.push_back(program("daemon-killed", 250, {}, kMotion));
   kinds.push_back(program("daemon-stopped", 250, {"late-tick"}, kMotion));
   kinds.push_back(program("disk-full", 250, {"not-written"}, {kLoading, kHolding}));
-  kinds.push_back(program("disk-read-only", 0, {"Read-only", "cannot be", "proc"}, {kIdle}));
+  kinds.push_back(program("disk-read-only", 0, {"/proc/tenter-session"}, {kIdle}));
   return kinds;
 }
 

@@ -30,6 +30,18 @@ constexpr std::int64_t kStuckAfter_ns = 600'000'000;
 constexpr double kAddedForce_N = 15.0;
 constexpr double kLongestCall_s = 4.0;  // twice what the daemon waits for its loop
 constexpr std::int64_t kMillisecond_ns = 1'000'000;
+constexpr const char* kHold = R"(schema_version = 1
+name = "hold"
+description = "nothing moves"
+axes = ["axis-1"]
+speed_m_per_s = 0.001
+capture_interval_s = 1.0
+[[phase]]
+name = "hold"
+[[phase.step]]
+end = "hold"
+hold_s = 1.0
+)";
 
 ScriptedFault faultOf(const Injection& injection) {
   const FaultKindRow& row = *injection.kind;
@@ -110,6 +122,8 @@ class Trial {
       rig_.stay(observed_s(), false, watch);
     } else if (kind_.name == "lease-stolen") {
       stealLease();
+    } else if (kind_.name == "lease-taken-over") {
+      takeOver();
     } else if (kind_.name == "daemon-killed") {
       kill(daemon, SIGKILL);
       peer_there_ = false;
@@ -123,8 +137,14 @@ class Trial {
       rig_.stay(observed_s(), true, watch);
     } else if (kind_.name == "disk-read-only") {
       RpcPeer& peer = rig_.peer();
-      if (peer.order("run", {{"protocol", "x"}, {"session", "/proc/tenter-session"}})) {
-        problem("a run began without a protocol");
+      if (peer.order("run", {{"protocol", kHold},
+                             {"session", "/proc/tenter-session"},
+                             {"fabric", "knit-12"},
+                             {"specimen", "1"},
+                             {"who", "trial"},
+                             {"operator", "trial"},
+                             {"areal_density_kg_per_m2", 0.2}})) {
+        problem("a run began that cannot be written");
       }
       error_ = peer.lastError();
     }
@@ -132,11 +152,21 @@ class Trial {
 
   void stealLease() {
     RpcPeer thief(rig_.running().socket());
-    for (const char* method : {"lease", "abort", "unload", "disable", "home", "reset"}) {
+    for (const char* method : {"lease", "unload", "disable", "home", "reset"}) {
       if (thief.order(method)) problem(std::string("somebody else could ") + method);
       if (std::string(method) == "lease") error_ = thief.lastError();
     }
     rig_.stay(observed_s(), true, [&](const nlohmann::json& status) { compare(status); });
+  }
+
+  /// The operator falls silent, and somebody else waits for the lease to run out.
+  void takeOver() {
+    rig_.peer().order("heartbeat");
+    begun_ns_ = monotonic_ns();
+    RpcPeer heir(rig_.running().socket());
+    const bool taken = rig_system_test::waitFor(3.0, [&] { return heir.order("lease"); });
+    if (!taken) problem("the lease does not run out");
+    rig_.stay(0.4, false, [&](const nlohmann::json& status) { compare(status); });
   }
 
   void limitFiles(rlim_t bytes) {

@@ -71,8 +71,15 @@ void TrialRig::connect() {
 }
 
 void TrialRig::order(const std::string& method, const nlohmann::json& params) {
-  peer_->order("heartbeat");
-  if (peer_->order(method, params)) return;
+  // On a busy machine a cell is stale now and then, and the rig wants all of them for a beginning.
+  constexpr double kPatience_s = 3.0;
+  const bool taken = waitFor(kPatience_s, [&] {
+    peer_->order("heartbeat");
+    if (peer_->order(method, params)) return true;
+    sleep(0.05);
+    return false;
+  });
+  if (taken) return;
   throw std::runtime_error(method + " was refused: " + peer_->lastError());
 }
 

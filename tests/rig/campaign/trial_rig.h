@@ -29,6 +29,8 @@ class TrialRig {
 
   /// Until the rig is ready, whatever state it is in. Throws after a minute.
   void recover();
+  /// An operator's; throws where it stays refused for some seconds.
+  void order(const std::string& method, const nlohmann::json& params = nlohmann::json::object());
   /// Into the phase; of the device's axis, or of the direction that it pulls in.
   void enter(RigPhase phase, int device);
   /// Once its run has ended, or the limit is over; whether it closed.
@@ -41,7 +43,6 @@ class TrialRig {
   void stay(double span_s, bool with_heartbeat, See see);
 
  private:
-  void order(const std::string& method, const nlohmann::json& params = nlohmann::json::object());
   void jog(int axis, double distance_m, double speed_m_per_s);
   void run(int device, bool hold);
   void sleep(double span_s);
