@@ -27,6 +27,13 @@ bool Lease::renew(std::uint64_t connection, std::int64_t now_ns) {
   return true;
 }
 
+bool Lease::extend(std::uint64_t connection, std::int64_t now_ns) {
+  const std::lock_guard lock(mutex_);
+  if (connection_ != connection) return false;
+  until_ns_ = now_ns + kLength_ns;
+  return true;
+}
+
 void Lease::release(std::uint64_t connection) {
   const std::lock_guard lock(mutex_);
   if (connection_ == connection) connection_ = 0;

@@ -120,9 +120,13 @@ Result<void> RigService::command(RigCommand command, std::shared_ptr<Recorder> r
   const std::uint64_t id = command.id = ++last_command_;
   waiting_[id].recorder = std::move(recorder);
   commands_.push_back(std::move(command));
-  const bool in_time =
-      answered_.wait_for(lock, kAnswerLimit, [&] { return waiting_[id].refusal.has_value(); });
-  const std::string refusal = in_time ? *waiting_[id].refusal : "the loop does not answer";
+  const auto answered = [&] { return waiting_[id].refusal.has_value(); };
+  if (!answered_.wait_for(lock, kAnswerLimit, answered)) {
+    // What the loop has not taken up it must not take up after this was answered.
+    std::erase_if(commands_, [&](const RigCommand& waiting) { return waiting.id == id; });
+    (void)answered_.wait_for(lock, kAnswerLimit, answered);
+  }
+  const std::string refusal = waiting_[id].refusal.value_or("the loop does not answer");
   waiting_.erase(id);
   if (!refusal.empty()) return Error{ErrorKind::kInterlock, "", "", refusal, ""};
   return {};
@@ -373,12 +377,15 @@ void RigService::publish(const RigTick& tick) {
   }
   for (std::size_t i = 0; i < tick.cells.size(); ++i) {
     const CellInput& cell = tick.cells[i];
+    const LoadCellScanStatistics scans = scanner_->statistics(i);
     nlohmann::json net_N;
     if (cell.gross_N) net_N = *cell.gross_N - machine_.tares_N()[i];
     status["cells"].push_back({{"name", config_.cells[i].id},
                                {"gross_N", numberOrNull(cell.gross_N)},
                                {"net_N", net_N},
                                {"age_ms", 1e-6 * static_cast<double>(cell.age_ns)},
+                               {"scan_ms", 1e-6 * static_cast<double>(scans.mean_ns)},
+                               {"longest_scan_ms", 1e-6 * static_cast<double>(scans.longest_ns)},
                                {"fault", cell.fault}});
   }
   status["time_ns"] = tick.time_ns;

@@ -136,7 +136,7 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
   }
   spdlog::info("{} by {}", method, client.user);
   if (row != nullptr) return plain(row->kind);
-  return method == "jog" ? jog(params) : run(params);
+  return method == "jog" ? jog(params) : run(params, client);
 }
 
 Result<Json> Rpc::status() const {
@@ -173,7 +173,7 @@ Result<Json> Rpc::jog(const Json& params) {
   return Json::object();
 }
 
-Result<Json> Rpc::run(const Json& params) {
+Result<Json> Rpc::run(const Json& params, const Client& client) {
   JsonReader in(params, "params");
   const std::string text = in.text("protocol", kMaxProtocol_bytes);
   const std::string folder = in.text("session", 4096);
@@ -188,11 +188,17 @@ Result<Json> Rpc::run(const Json& params) {
   if (!in.ok()) return in.error();
   auto writer = SessionWriter::create(folder, header);
   if (!writer) return writer.error();
+  // A busy disk may have taken longer than the lease lasts, and the client waited for it.
+  const bool still_operates = lease_.extend(client.connection, monotonic_ns());
+  tick();
   RigCommand command;
   command.kind = Kind::kRun;
   command.protocol = std::make_shared<CaptureProtocol>(*protocol);
   auto recorder = std::make_shared<Recorder>(*std::move(writer), monotonic_ns());
-  if (auto done = service_.command(command, recorder); !done) {
+  auto done = still_operates
+                  ? service_.command(command, recorder)
+                  : Error{ErrorKind::kInterlock, "", "", "this client does not operate the rig", ""};
+  if (!done) {
     recorder.reset();
     std::error_code ignored;  // what is left then holds its two records and says so
     std::filesystem::remove_all(folder, ignored);

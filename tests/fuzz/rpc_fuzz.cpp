@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The daemon's JSON-RPC: whatever a line holds, the answer is one line of JSON-RPC, and nothing is
 // written outside of the session that was asked for. The rig has no devices.
+#include <spdlog/spdlog.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -62,6 +64,7 @@ void require(bool promise, const char* what) {
 /// A daemon without its socket, for as long as the fuzzer runs.
 struct Daemon {
   Daemon() {
+    spdlog::set_level(spdlog::level::off);
     auto started = tenter::daemon::RigService::start(*tenter::parseRigConfig(kRig, "rig.toml"));
     require(started.ok(), "the daemon starts without devices");
     service = *std::move(started);

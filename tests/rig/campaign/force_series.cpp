@@ -55,11 +55,14 @@ void trial(TrialRig& rig, int number, double wait_s, int cell, bool tcp) {
   const bool moved = rig.truth().drawn_m(begun_ns - 200'000'000, begun_ns) > 1e-4;
   const bool closed = rig.waitForSession(10.0);
   const auto report = verifySession(session);
+  const nlohmann::json at_cell = rig.peer().status().at("cells").at(static_cast<std::size_t>(cell));
   const nlohmann::json line{
       {"cell", cell + 1},
       {"moved_before", moved},
       {"halted_ms", loading_ns == 0 ? 0.0 : 1e-6 * static_cast<double>(loading_ns - begun_ns)},
       {"drawn_m", drawn_m},
+      {"scan_ms", at_cell.at("scan_ms")},
+      {"longest_scan_ms", at_cell.at("longest_scan_ms")},
       {"overshoot_N", drawn_m * kStiffest_N_per_m},
       {"session_ok", closed && report && report->ok()}};
   std::printf("%s\n", line.dump().c_str());

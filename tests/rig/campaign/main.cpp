@@ -21,8 +21,15 @@ int run(const Options& o) {
   int bad = 0;
   for (const Injection& injection : makePlan(o.seed, o.count, o.shard, o.shards, tcp)) {
     if (!o.only.empty() && injection.kind->name != o.only) continue;
-    trial.recover();
-    const Verdict verdict = tryFault(trial, injection);
+    Verdict verdict;
+    verdict.injection = injection;
+    try {
+      trial.recover();
+      verdict = tryFault(trial, injection);
+    } catch (const std::exception& error) {  // the others are still to be tried
+      verdict.problems.emplace_back(error.what());
+      trial.restart();
+    }
     std::printf("%s\n", verdict.json().dump().c_str());
     std::fflush(stdout);
     if (!verdict.problems.empty()) ++bad;
