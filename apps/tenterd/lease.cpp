@@ -3,8 +3,7 @@
 
 namespace tenter::daemon {
 
-Lease::Taken Lease::acquire(std::uint64_t connection, const std::string& who,
-                            std::int64_t now_ns) {
+Lease::Taken Lease::acquire(std::uint64_t connection, const std::string& who, std::int64_t now_ns) {
   const std::lock_guard lock(mutex_);
   const bool in_force = connection_ != 0 && now_ns < until_ns_;
   if (in_force && connection_ != connection) return Taken::kRefused;

@@ -20,8 +20,8 @@ class Lease {
   Taken acquire(std::uint64_t connection, const std::string& who, std::int64_t now_ns);
   /// False if that connection does not hold it (any more).
   bool renew(std::uint64_t connection, std::int64_t now_ns);
-  /// After the daemon itself kept its holder from a heartbeat: also if it has run out meanwhile, but
-  /// not if another one has it.
+  /// After the daemon itself kept its holder from a heartbeat: also if it has run out meanwhile,
+  /// but not if another one has it.
   bool extend(std::uint64_t connection, std::int64_t now_ns);
   void release(std::uint64_t connection);
   bool heldBy(std::uint64_t connection, std::int64_t now_ns) const;

@@ -54,8 +54,8 @@ Result<std::unique_ptr<RigService>> RigService::start(RigConfig config) {
   options.on_event = [events](const LoadCellEvent& event) { events->push(event); };
   auto scanner = LoadCellScanner::start(config.cells, options);
   if (!scanner) return scanner.error();
-  return std::unique_ptr<RigService>(new RigService(std::move(config), *std::move(bank),
-                                                    std::move(events), *std::move(scanner)));
+  return std::unique_ptr<RigService>(
+      new RigService(std::move(config), *std::move(bank), std::move(events), *std::move(scanner)));
 }
 
 RigService::RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<CellEvents> events,
@@ -271,7 +271,8 @@ void RigService::obey(const RigOrders& orders) {
   for (int i = 0; i < bank_.size(); ++i) {
     if (!orders.energise && !orders.home) break;
     if (orders.energise) {
-      note({bank_.axis(i).energise(kEnergiseTimeout), bank_.axis(i).exitSafeStart(kEnergiseTimeout)});
+      note({bank_.axis(i).energise(kEnergiseTimeout),
+            bank_.axis(i).exitSafeStart(kEnergiseTimeout)});
     }
     if (orders.home) note({bank_.axis(i).goHome(HomeTowards::kMin, kEnergiseTimeout)});
   }

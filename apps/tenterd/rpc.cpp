@@ -29,10 +29,10 @@ struct PlainRow {
 };
 /// Commands without parameters, for whoever holds the lease.
 constexpr std::array kPlain{
-    PlainRow{"enable", Kind::kEnable},       PlainRow{"disable", Kind::kDisable},
-    PlainRow{"home", Kind::kHome},           PlainRow{"tare", Kind::kTare},
-    PlainRow{"pause", Kind::kPause, true},   PlainRow{"resume", Kind::kResume, true},
-    PlainRow{"abort", Kind::kAbort, true},   PlainRow{"reset", Kind::kReset},
+    PlainRow{"enable", Kind::kEnable},     PlainRow{"disable", Kind::kDisable},
+    PlainRow{"home", Kind::kHome},         PlainRow{"tare", Kind::kTare},
+    PlainRow{"pause", Kind::kPause, true}, PlainRow{"resume", Kind::kResume, true},
+    PlainRow{"abort", Kind::kAbort, true}, PlainRow{"reset", Kind::kReset},
     PlainRow{"unload", Kind::kUnload}};
 
 const PlainRow* findPlain(std::string_view method) {
@@ -195,9 +195,9 @@ Result<Json> Rpc::run(const Json& params, const Client& client) {
   command.kind = Kind::kRun;
   command.protocol = std::make_shared<CaptureProtocol>(*protocol);
   auto recorder = std::make_shared<Recorder>(*std::move(writer), monotonic_ns());
-  auto done = still_operates
-                  ? service_.command(command, recorder)
-                  : Error{ErrorKind::kInterlock, "", "", "this client does not operate the rig", ""};
+  auto done = still_operates ? service_.command(command, recorder)
+                             : Error{ErrorKind::kInterlock, "", "",
+                                     "this client does not operate the rig", ""};
   if (!done) {
     recorder.reset();
     std::error_code ignored;  // what is left then holds its two records and says so

@@ -11,7 +11,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string dumped(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string dumped(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 Json numberOrNull(const std::optional<double>& value) {
   Json out;
@@ -85,16 +87,15 @@ std::vector<RecordBody> RigJournal::tickRecords(const RigTick& tick) {
   if (tick.halted_outside || tick.trip) {
     Json trip;
     if (tick.trip) trip = Json{{"cell", tick.trip->cell}, {"gross_N", tick.trip->gross_N}};
-    records.emplace_back(
-        GenericRecord{rig_journal::kHalt,
-                      dumped({{"halted_outside", tick.halted_outside}, {"trip", trip}})});
+    records.emplace_back(GenericRecord{
+        rig_journal::kHalt, dumped({{"halted_outside", tick.halted_outside}, {"trip", trip}})});
   }
   for (const RigCommand& command : tick.commands) {
-    records.emplace_back(GenericRecord{rig_journal::kCommand,
-                                       dumped({{"command", rigCommandName(command.kind)},
-                                               {"axis", command.axis},
-                                               {"distance_m", command.distance_m},
-                                               {"speed_m_per_s", command.speed_m_per_s}})});
+    records.emplace_back(
+        GenericRecord{rig_journal::kCommand, dumped({{"command", rigCommandName(command.kind)},
+                                                     {"axis", command.axis},
+                                                     {"distance_m", command.distance_m},
+                                                     {"speed_m_per_s", command.speed_m_per_s}})});
   }
   SampleRecord sample;
   for (const AxisInput& axis : tick.axes) sample.positions_m.push_back(axis.position_m);

@@ -84,7 +84,7 @@ RigMachine::RigMachine(RigConfig config, const RigMemory& memory) : RigMachine(s
 }
 
 RigMemory RigMachine::memory() const {
-  return {state_, reason_,   enabled_, emergency_, blind_,   last_ns_,
+  return {state_, reason_,   enabled_, emergency_, blind_,  last_ns_,
           axes_,  heard_ns_, known_m_, felt_ns_,   tares_N_};
 }
 

@@ -136,7 +136,10 @@ TEST(Redecider, DecidesEveryKindOfEndAgain) {
       {"\"how\":\"aborted\"", at(150, command(Kind::kAbort))},
       {"operator's stop", at(150, command(Kind::kStop))},
       {"operator's stop", at(150, [](auto& b) { b.tick.halted_outside = true; })},
-      {"absolute-force", at(150, [](auto& b) { b.tick.trip = ForceTrip{1, 6.123456789012345}; })},
+      {"absolute-force", at(150,
+                            [](auto& b) {
+                              b.tick.trip = ForceTrip{1, 6.123456789012345};
+                            })},
       {"absolute-force", at(150, [](auto& b) { b.extra_N = 7.1; })},
       {"silence", at(150, [](auto& b) { b.stale_cell = 1; })},
       {"timeout", at(150, [](auto& b) { b.mute_axis = 0; })},

@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "tenter/core/files.h"
+#include "tenter/rig/toml_document.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
-#include "tenter/rig/toml_document.h"
 
 namespace tenter {
 namespace {

@@ -84,10 +84,9 @@ struct Daemon {
 /// Sessions go where none can be made, so that no input writes to this machine.
 std::string tamed(std::string_view line) {
   Json request = Json::parse(line, nullptr, false);
-  const bool names_session = request.is_object() && request.contains("params") &&
-                             request["params"].is_object() &&
-                             request["params"].contains("session") &&
-                             request["params"]["session"].is_string();
+  const bool names_session =
+      request.is_object() && request.contains("params") && request["params"].is_object() &&
+      request["params"].contains("session") && request["params"]["session"].is_string();
   if (!names_session) return std::string(line);
   request["params"]["session"] = "/proc/tenter-fuzz";
   return request.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -97,14 +96,17 @@ std::string tamed(std::string_view line) {
 
 std::vector<std::string> fuzzSeeds() {
   std::vector<std::string> seeds;
-  for (const char* method : {"status", "stop", "lease", "heartbeat", "enable", "disable", "home", "tare",
-                             "pause", "resume", "abort", "unload", "reset", "dance"}) {
+  for (const char* method : {"status", "stop", "lease", "heartbeat", "enable", "disable", "home",
+                             "tare", "pause", "resume", "abort", "unload", "reset", "dance"}) {
     seeds.push_back(Json{{"jsonrpc", "2.0"}, {"id", 1}, {"method", method}}.dump());
   }
   const Json jog{{"axis", "axis-1"}, {"distance_m", 0.001}, {"speed_m_per_s", 0.001}};
-  const Json run{{"protocol", kProtocol}, {"session", "/proc/tenter-fuzz"},
-                 {"fabric", "f"},         {"specimen", "s"},
-                 {"who", "w"},            {"operator", "o"},
+  const Json run{{"protocol", kProtocol},
+                 {"session", "/proc/tenter-fuzz"},
+                 {"fabric", "f"},
+                 {"specimen", "s"},
+                 {"who", "w"},
+                 {"operator", "o"},
                  {"areal_density_kg_per_m2", 0.2}};
   seeds.push_back(Json{{"jsonrpc", "2.0"}, {"id", "x"}, {"method", "jog"}, {"params", jog}}.dump());
   seeds.push_back(Json{{"jsonrpc", "2.0"}, {"id", 2}, {"method", "run"}, {"params", run}}.dump());
@@ -119,7 +121,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const tenter::daemon::Client client{1, "somebody"};
   const std::string answer = daemon.rpc->answer(line, client);
   if (answer.empty()) {
-    require(!Json::parse(line, nullptr, false).contains("id"), "only a notification stays unanswered");
+    require(!Json::parse(line, nullptr, false).contains("id"),
+            "only a notification stays unanswered");
     return 0;
   }
   require(answer.find('\n') == std::string::npos, "an answer is one line");

@@ -19,7 +19,6 @@ namespace {
 
 using testing::HasSubstr;
 
-
 constexpr const char* kScript = R"(schema_version = 1
 [[fault]]
 name = "gone"
@@ -73,7 +72,8 @@ TEST(FaultScriptTest, IsPlayedAndLogged) {
   ASSERT_EQ(events.size(), 4U);
   EXPECT_EQ(events[0].at("device"), "axis-2");
   EXPECT_EQ(events[0].at("what"), "begins");
-  EXPECT_NEAR(events[1].at("time_s").get<double>() - events[0].at("time_s").get<double>(), 0.3, 0.2);
+  EXPECT_NEAR(events[1].at("time_s").get<double>() - events[0].at("time_s").get<double>(), 0.3,
+              0.2);
   EXPECT_EQ(events[2].at("kind"), "silence");
   EXPECT_EQ(events[3].at("what"), "ends");
   EXPECT_THAT(test_support::slurp(folder / "out"), HasSubstr("tenterd --config"));
@@ -82,7 +82,8 @@ TEST(FaultScriptTest, IsPlayedAndLogged) {
 TEST(FaultScriptTest, AnUnusableScriptEndsWithThreeBeforeAnythingIsServed) {
   const test_support::TemporaryFolder folder;
   for (const std::string& text :
-       {std::string("schema_version = 1\n[[fault]]\ndevice = \"axis-9\"\nkind = \"stall\"\nat_s = 1\n"),
+       {std::string(
+            "schema_version = 1\n[[fault]]\ndevice = \"axis-9\"\nkind = \"stall\"\nat_s = 1\n"),
         std::string("[["), std::string()}) {
     const std::string script = folder.write("faults.toml", text);
     const pid_t twin = start({TENTER_PROGRAM, "twin", "serve", "--fabric", "knit-12", "--state",

@@ -47,8 +47,9 @@ nlohmann::json RpcPeer::call(const std::string& method, const nlohmann::json& pa
   }
   nlohmann::json answer = nlohmann::json::parse(pending_.substr(0, end));
   pending_.erase(0, end + 1);
-  longest_s_ = std::max(
-      longest_s_, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  const double taken_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (method != "run") longest_s_ = std::max(longest_s_, taken_s);
   return answer;
 }
 

@@ -42,8 +42,7 @@ void RunningRig::restartDaemon() {
 void RunningRig::startDaemon() {
   ++starts_;
   daemon_ = valueOf(rig_->usb().spawn(
-      {TENTER_DAEMON, "--config", rig_->configFile().string(), "--socket", socket()},
-      log()));
+      {TENTER_DAEMON, "--config", rig_->configFile().string(), "--socket", socket()}, log()));
   if (!waitFor(10.0, [&] { return std::filesystem::is_socket(socket()); })) {
     throw std::runtime_error("no socket");
   }

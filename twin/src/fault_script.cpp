@@ -221,7 +221,8 @@ Result<FaultScript> parseFaultScript(std::string_view toml, const std::string& f
   FaultScript script;
   if (in.has("seed")) script.seed = static_cast<std::uint64_t>(in.integer("seed", 0, 1LL << 52));
   const std::size_t size = in.arraySize("fault");
-  if (in.ok() && (size == 0 || size > kMaxFaults)) in.fail("fault", "must be there 1 to 1000 times");
+  if (in.ok() && (size == 0 || size > kMaxFaults))
+    in.fail("fault", "must be there 1 to 1000 times");
   std::set<std::string> names;
   for (std::size_t i = 0; i < size && in.ok(); ++i) {
     script.faults.push_back(readFault(in.element("fault", i), i, axes, tcp, names));

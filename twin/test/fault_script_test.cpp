@@ -110,8 +110,7 @@ class Play {
         now.positions_m[static_cast<std::size_t>(i)] += speed_m_per_s * kStep_s;
       }
       for (const FaultAction& action : schedule.step(time_s, now)) {
-        events.push_back((action.begins ? "+" : "-") +
-                         schedule.script().faults[action.fault].name);
+        events.push_back((action.begins ? "+" : "-") + schedule.script().faults[action.fault].name);
         times_s.push_back(time_s);
       }
     }
@@ -173,9 +172,11 @@ TEST(FaultSchedule, BeginsWithAPhaseAsOftenAsAsked) {
 
 TEST(FaultSchedule, BeginsAtAForceAPositionOrAfterAnother) {
   Play play(
-      "name = \"f\"\ndevice = \"axis-2\"\nkind = \"jammed\"\nforce_N = 0.5\nfor_s = 0.1\n[[fault]]\n"
+      "name = \"f\"\ndevice = \"axis-2\"\nkind = \"jammed\"\nforce_N = 0.5\nfor_s = "
+      "0.1\n[[fault]]\n"
       "name = \"p\"\ndevice = \"axis-1\"\nkind = \"stall\"\nposition_m = 0.001\n[[fault]]\n"
-      "name = \"g\"\ndevice = \"axis-1\"\nkind = \"unplug\"\nafter = \"f\"\ndelay_s = 0.3\nfor_s = 1.0");
+      "name = \"g\"\ndevice = \"axis-1\"\nkind = \"unplug\"\nafter = \"f\"\ndelay_s = 0.3\nfor_s = "
+      "1.0");
   play.run(0.5);
   EXPECT_THAT(play.events, IsEmpty());
   play.now.tensions_N[1] = 0.6;

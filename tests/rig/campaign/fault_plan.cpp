@@ -68,8 +68,8 @@ std::vector<FaultKindRow> makeKinds() {
   FaultKindRow flip = cell("sign-flip", {"sign-flip"});
   flip.phases = {kHolding};
   kinds.push_back(flip);
-  kinds.push_back(cell("word-swap", {"word-order", "over-range", "inconsistent", "not-a-number",
-                                     "sign-flip"}));
+  kinds.push_back(
+      cell("word-swap", {"word-order", "over-range", "inconsistent", "not-a-number", "sign-flip"}));
   kinds.push_back(cell("cell-error", {"cell-error"}));
   FaultKindRow force = cell("added-force", {"absolute-force", "working-force"});
   force.bound_ms = kForce_ms;
@@ -118,7 +118,8 @@ std::vector<Injection> makePlan(std::uint64_t seed, int count, int shard, int sh
     const std::size_t at = static_cast<std::size_t>(i) % pairs.size();
     // Not std::shuffle: its draws are each library's own.
     if (at == 0) {
-      for (std::size_t k = pairs.size() - 1; k > 0; --k) std::swap(pairs[k], pairs[random() % (k + 1)]);
+      for (std::size_t k = pairs.size() - 1; k > 0; --k)
+        std::swap(pairs[k], pairs[random() % (k + 1)]);
     }
     Injection injection = pairs[at];
     injection.device = static_cast<int>(random() % ServedRig::kAxes);

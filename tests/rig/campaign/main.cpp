@@ -14,22 +14,36 @@ struct Options {
   std::string modbus = "tcp", only;
 };
 
+using namespace tenter::campaign;  // NOLINT(google-build-using-namespace)
+
+/// Where the machine that runs this is so busy that the rig halts before the injection, another
+/// time.
+Verdict attempt(TrialRig& trial, const Injection& injection) {
+  constexpr int kAttempts = 4;
+  Verdict verdict;
+  verdict.injection = injection;
+  for (int i = 0; i < kAttempts; ++i) {
+    try {
+      trial.recover();
+      Verdict made = tryFault(trial, injection);
+      made.disturbed = i;
+      return made;
+    } catch (const std::exception& error) {  // the others are still to be tried
+      verdict.problems = {error.what()};
+      trial.restart();
+    }
+  }
+  verdict.disturbed = kAttempts;
+  return verdict;
+}
+
 int run(const Options& o) {
-  using namespace tenter::campaign;  // NOLINT(google-build-using-namespace)
   const bool tcp = o.modbus == "tcp";
   TrialRig trial(tcp);
   int bad = 0;
   for (const Injection& injection : makePlan(o.seed, o.count, o.shard, o.shards, tcp)) {
     if (!o.only.empty() && injection.kind->name != o.only) continue;
-    Verdict verdict;
-    verdict.injection = injection;
-    try {
-      trial.recover();
-      verdict = tryFault(trial, injection);
-    } catch (const std::exception& error) {  // the others are still to be tried
-      verdict.problems.emplace_back(error.what());
-      trial.restart();
-    }
+    const Verdict verdict = attempt(trial, injection);
     std::printf("%s\n", verdict.json().dump().c_str());
     std::fflush(stdout);
     if (!verdict.problems.empty()) ++bad;
@@ -56,12 +70,12 @@ int main(int argc, char** argv) {
   try {
     return run(options);
   } catch (const std::exception& error) {
-    std::printf("%s\n", nlohmann::json{{"kind", "campaign"},
-                                       {"phase", "-"},
-                                       {"device", 0},
-                                       {"problems", {error.what()}}}
-                            .dump()
-                            .c_str());
+    std::printf(
+        "%s\n",
+        nlohmann::json{
+            {"kind", "campaign"}, {"phase", "-"}, {"device", 0}, {"problems", {error.what()}}}
+            .dump()
+            .c_str());
     return 1;
   }
 }

@@ -39,7 +39,10 @@ def main():
         f"{len({(line['kind'], line['phase'], line['device']) for line in lines})} with the device; "
         f"{sum(line.get('values', 0) for line in lines)} tensions compared, "
         f"{sum(line.get('wrong_values', 0) for line in lines)} wrong; "
-        f"longest call of the daemon {largest(lines, 'longest_call_s'):.3f} s; {len(bad)} with a problem"
+        f"longest call of the daemon {largest(lines, 'longest_call_s'):.3f} s; "
+        f"{sum(line.get('overlong_calls', 0) for line in lines)} calls of devices beyond twice their time-out; "
+        f"{sum(line.get('disturbed', 0) for line in lines)} attempts disturbed before the injection; "
+        f"{len(bad)} with a problem"
     )
     for line in bad:
         print(json.dumps(line), file=sys.stderr)

@@ -82,6 +82,12 @@ class Trial {
     rig_.truth().forget();
     rig_.enter(phase_, verdict_.injection.device);
     std::this_thread::sleep_for(std::chrono::duration<double>(verdict_.injection.delay_s));
+    const nlohmann::json before = rig_.peer().status();
+    const std::string state = before.value("state", "");
+    overlong_before_ = overlongCalls(before);
+    if (state == "fault" || state == "stopped" || state == "off") {
+      throw std::runtime_error("halted before the injection: " + before.value("reason", ""));
+    }
     log_begin_ = fs::file_size(rig_.running().log());
     begun_ns_ = monotonic_ns();
     kind_.part == Part::kProgram ? befallProgram() : befallDevice();
@@ -90,9 +96,12 @@ class Trial {
     end();
     judgeSession();
     judgeNames();
-    if (rig_.running().rig().usb().size() > 0 && peerThere()) {
-      verdict_.longest_call_s = rig_.peer().longestCall_s();
+    if (peer_there_) {
+      verdict_.longest_call_s = rig_.peer().takeLongestCall_s();
       if (verdict_.longest_call_s > kLongestCall_s) problem("a call took too long");
+      if (kind_.name != "daemon-stopped" && kind_.name != "daemon-killed") {
+        verdict_.overlong_calls = overlongCalls(rig_.peer().status()) - overlong_before_;
+      }
     }
     if (verdict_.wrong_values > 0) problem("a wrong value was accepted");
     return verdict_;
@@ -100,8 +109,11 @@ class Trial {
 
  private:
   void problem(const std::string& text) { verdict_.problems.push_back(text); }
-  bool peerThere() const { return peer_there_; }
   double observed_s() const { return std::max(0.5, 1e-3 * kind_.bound_ms + 0.25); }
+
+  static int overlongCalls(const nlohmann::json& status) {
+    return status.contains("loop") ? status["loop"].value("overlong_calls", 0) : 0;
+  }
 
   void befallDevice() {
     fault_ = faultOf(verdict_.injection);
@@ -230,8 +242,7 @@ class Trial {
     const bool everything = kind_.name == "kill-switch" || kind_.name == "daemon-killed" ||
                             kind_.name == "daemon-stopped";
     const bool cells_count = phase_ == RigPhase::kJog || phase_ == RigPhase::kLoading;
-    const bool loading =
-        kind_.name == "added-force" || kind_.part != Part::kCell || cells_count;
+    const bool loading = kind_.name == "added-force" || kind_.part != Part::kCell || cells_count;
     if (kind_.once || kind_.bound_ms == 0 || phase_ == RigPhase::kIdle) return;
     const std::int64_t bound_ns = begun_ns_ + kind_.bound_ms * kMillisecond_ns;
     if (everything && motion_ns > bound_ns) {
@@ -247,10 +258,9 @@ class Trial {
   }
 
   bool isNamed(const std::string& text) const {
-    const std::string device = kind_.part == Part::kCell   ? "cell-" : "axis-";
-    const std::string source = kind_.part == Part::kProgram
-                                   ? ""
-                                   : device + std::to_string(verdict_.injection.device + 1);
+    const std::string device = kind_.part == Part::kCell ? "cell-" : "axis-";
+    const std::string source =
+        kind_.part == Part::kProgram ? "" : device + std::to_string(verdict_.injection.device + 1);
     std::size_t from = 0;
     while (from < text.size()) {
       const std::size_t end = std::min(text.find('\n', from), text.size());
@@ -334,6 +344,7 @@ class Trial {
   Verdict verdict_;
   std::optional<ScriptedFault> fault_;
   std::int64_t begun_ns_ = 0;
+  int overlong_before_ = 0;
   std::size_t log_begin_ = 0;
   bool peer_there_ = true;
   std::string last_state_, error_, journal_;
@@ -350,7 +361,9 @@ nlohmann::json Verdict::json() const {
           {"motion_ms", motion_ms},
           {"values", values},
           {"wrong_values", wrong_values},
-          {"longest_call_s", longest_call_s}};
+          {"longest_call_s", longest_call_s},
+          {"overlong_calls", overlong_calls},
+          {"disturbed", disturbed}};
 }
 
 Verdict tryFault(TrialRig& trial, const Injection& injection) {

@@ -17,11 +17,14 @@ struct Verdict {
   double motion_ms = 0.0;             ///< To the last movement of any axis.
   int values = 0, wrong_values = 0;   ///< Tensions that the daemon stated, against the truth.
   double longest_call_s = 0.0;
+  int overlong_calls = 0;  ///< Of devices, beyond twice their time-out.
+  int disturbed = 0;       ///< Attempts before it in which the rig halted for another reason.
 
   nlohmann::json json() const;
 };
 
-/// One injection into a rig that is ready; leaves it to recover().
+/// One injection into a rig that is ready; leaves it to recover(). Throws if the rig halts before
+/// the injection.
 Verdict tryFault(TrialRig& trial, const Injection& injection);
 
 }  // namespace tenter::campaign

@@ -109,7 +109,8 @@ void TrialRig::recover() {
     sleep(0.02);
     return false;
   });
-  if (!ready) throw std::runtime_error("the rig does not recover: " + status.value("state", "") + ", " +
+  if (!ready)
+    throw std::runtime_error("the rig does not recover: " + status.value("state", "") + ", " +
                              status.value("reason", "") + ": " + status.dump());
 }
 
@@ -144,7 +145,8 @@ void TrialRig::enter(RigPhase phase, int device) {
     case RigPhase::kIdle:
       return;
     case RigPhase::kHoming:
-      if (peer_->status().at("axes").at(static_cast<std::size_t>(device)).at("position_m") < kHomingWay_m) {
+      if (peer_->status().at("axes").at(static_cast<std::size_t>(device)).at("position_m") <
+          kHomingWay_m) {
         jog(device, kHomingWay_m, kFast_m_per_s);
         rest();
       }
