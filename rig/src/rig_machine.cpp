@@ -348,26 +348,33 @@ std::string RigMachine::refusalOf(const RigCommand& command) const {
   return calm ? refusalOfHome() : no;
 }
 
-/// Homing is for slack cords. One that pulls though its axis counts no way left to let it out has
-/// lost its count, as a device does without power: only homing can let that out.
+/// Homing is for slack cords. An axis that lost its count, as a device does without power, may
+/// count no way left though its cord pulls, and only homing lets that out; cords whose axes stand
+/// at their ends may pull along with it.
 std::string RigMachine::refusalOfHome() const {
+  std::string loaded;
+  bool any_lost = false;
   for (std::size_t i = 0; i < config_.cells.size(); ++i) {
+    const std::string& name = config_.cells[i].id;
     const auto tension_N = net_N(i);
-    if (!tension_N) return config_.cells[i].id + " gives no tension";
-    if (*tension_N > config_.limits.slack_N && !isLostAtItsEnd(static_cast<int>(i))) {
-      return config_.cells[i].id + " is under load: unload first";
-    }
+    if (!tension_N) return name + " gives no tension";
+    if (*tension_N <= config_.limits.slack_N) continue;
+    const std::optional<std::size_t> axis = axisAtItsEnd(static_cast<int>(i));
+    if (!axis) return name + " is under load: unload first";
+    any_lost = any_lost || !axes_[*axis].position_certain;
+    loaded = name;
   }
-  return "";
+  return loaded.empty() || any_lost ? "" : loaded + " is under load: unload first";
 }
 
-bool RigMachine::isLostAtItsEnd(int cell) const {
+/// The axis of a cell, if by its count it cannot let out any more.
+std::optional<std::size_t> RigMachine::axisAtItsEnd(int cell) const {
   for (std::size_t i = 0; i < config_.axes.size(); ++i) {
     if (config_.axes[i].cell != cell) continue;
     const double end_m = config_.axes[i].device.travel_min_m + config_.limits.following_error_m;
-    return !axes_[i].position_certain && known_m_[i] <= end_m;
+    if (known_m_[i] <= end_m) return i;
   }
-  return false;
+  return std::nullopt;
 }
 
 std::string RigMachine::refusalOfJog(const RigCommand& command) const {

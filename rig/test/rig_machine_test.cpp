@@ -337,7 +337,7 @@ TEST(RigMachineTest, HomesUnderLoadOnlyWhatHasLostItsCount) {
   MachineBench bench;
   bench.enable();
   bench.extra_N = 1.0;
-  bench.position_m = {0.0005, 0.01};
+  bench.position_m = {0.0005, 0.01};  // the first cord cannot be let out any further
   bench.goal_m = bench.position_m;
   bench.step();
   EXPECT_THAT(bench.command(Kind::kHome), HasSubstr("under load"));

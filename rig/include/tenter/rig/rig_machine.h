@@ -158,7 +158,7 @@ class RigMachine {
   std::string refusalOf(const RigCommand& command) const;
   void carryOut(const RigCommand& command);
   std::string refusalOfHome() const;
-  bool isLostAtItsEnd(int cell) const;
+  std::optional<std::size_t> axisAtItsEnd(int cell) const;
   std::string refusalOfJog(const RigCommand& command) const;
   std::string refusalOfRun(const RigCommand& command) const;
   // rig_motion.cpp: what is to be done
