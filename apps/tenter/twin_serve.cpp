@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <chrono>
+#include <optional>
 #include <thread>
 
 #include "device_preload.h"
 #include "interrupt.h"
-#include "tenter/twin/served_rig.h"
+#include "tenter/twin/fault_player.h"
 #include "verbs.h"
 
 namespace tenter::app {
@@ -13,7 +14,7 @@ namespace {
 
 struct Options {
   ServedRigOptions rig;
-  std::string state, modbus = "tcp";
+  std::string state, modbus = "tcp", faults;
 };
 
 void declare(CLI::App& command, Options& o) {
@@ -22,6 +23,7 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--modbus", o.modbus, "How the load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
+  command.add_option("--fault", o.faults, "Script of faults (docs/formats/fault-script.md)");
   command.add_option("--protocol", o.rig.mount.protocol, "How the sample hangs")
       ->capture_default_str();
   command.add_option("--seed", o.rig.mount.seed, "Of the cells' noise and of the specimen")
@@ -34,13 +36,28 @@ void declare(CLI::App& command, Options& o) {
 
 std::string quoted(const std::string& text) { return "'" + text + "'"; }
 
+/// Nothing without a script; what it does goes to faults.jsonl in the state folder.
+Result<std::unique_ptr<FaultPlayer>> play(std::optional<FaultScript> script, ServedRig& rig) {
+  if (!script) return std::unique_ptr<FaultPlayer>();
+  return FaultPlayer::start(rig, *std::move(script),
+                            rig.configFile().replace_filename("faults.jsonl"));
+}
+
 Result<int> serve(const Options& o, Console& console) {
+  std::optional<FaultScript> script;
+  if (!o.faults.empty()) {
+    auto read = readFaultScript(o.faults, ServedRig::kAxes, o.modbus == "tcp");
+    if (!read) return read.error();
+    script = *std::move(read);
+  }
   if (auto ready = preloadDevices(); !ready) return ready.error();
   ServedRigOptions options = o.rig;
   options.state = o.state;
   options.tcp = o.modbus == "tcp";
   const auto rig = ServedRig::start(options);
   if (!rig) return rig.error();
+  const auto player = play(std::move(script), **rig);
+  if (!player) return player.error();
   std::string command = "env";
   for (const std::string& variable : (*rig)->usb().environment()) command += " " + quoted(variable);
   const std::string config = (*rig)->configFile().string();

@@ -82,6 +82,19 @@ Result<int> stop(const Options& o, Console& console) {
   return kDone;
 }
 
+/// Of a run that another terminal of the same user has started and goes on watching.
+template <const char* kMethod>
+Result<int> beside(const Options& o, Console& console) {
+  const auto client = RigClient::connect(o.socket->as<std::string>());
+  if (!client) return client.error();
+  if (auto done = (*client)->call(kMethod); !done) return done.error();
+  const auto answer = (*client)->call("status");
+  if (!answer) return answer.error();
+  console.answer = *answer;
+  console.say("the rig is " + answer->value("state", ""));
+  return kDone;
+}
+
 Result<int> giveAndWait(const Options& o, Console& console, const std::string& method,
                         const Json& params = Json::object()) {
   const auto visit = RigVisit::begin(o.socket->as<std::string>(), console);
@@ -122,7 +135,13 @@ Result<int> plain(const Options& o, Console& console) {
 }
 
 constexpr char kEnable[] = "enable", kDisable[] = "disable", kHome[] = "home", kTare[] = "tare",
-               kUnload[] = "unload", kReset[] = "reset";
+               kUnload[] = "unload", kReset[] = "reset", kPause[] = "pause", kResume[] = "resume",
+               kAbort[] = "abort";
+
+template <const char* kMethod>
+void setUpBeside(CLI::App& command, Action& action) {
+  setUpCommand<Options>(command, action, declareSocket, beside<kMethod>);
+}
 
 template <const char* kMethod>
 void setUpPlain(CLI::App& command, Action& action) {
@@ -143,6 +162,9 @@ Verb rigVerb() {
       Verb{"tare", "Take the tensions of now for zero", setUpPlain<kTare>},
       Verb{"unload", "Let all cords out until they are slack", setUpPlain<kUnload>},
       Verb{"reset", "Leave a fault or a stop behind", setUpPlain<kReset>},
+      Verb{"pause", "Hold the run that is under way", setUpBeside<kPause>},
+      Verb{"resume", "Go on with a run that was held", setUpBeside<kResume>},
+      Verb{"abort", "End the run that is under way, and unload", setUpBeside<kAbort>},
       Verb{"jog", "Move one axis",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareJog, jog); }},
       Verb{"run", "Run a protocol and record the session; homes first if it must",

@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
-#include <charconv>
-#include <cmath>
-#include <limits>
 
-#include "interrupt.h"
 #include "output_guard.h"
-#include "progress.h"
-#include "tenter/core/files.h"
-#include "tenter/session/replay.h"
 #include "tenter/session/session_export.h"
 #include "tenter/session/session_reader.h"
 #include "tenter/session/session_writer.h"
@@ -18,21 +11,12 @@ namespace tenter::app {
 
 namespace {
 
-constexpr const char* kAsFastAsItGoes = "max";
-
 struct Options {
-  std::string session, output, target, speed = kAsFastAsItGoes;
+  std::string session, output, target;
 };
 
 void declareSession(CLI::App& command, Options& o) {
   command.add_option("session", o.session, "Session folder")->required();
-}
-
-void declareReplay(CLI::App& command, Options& o) {
-  declareSession(command, o);
-  command.add_option("--speed", o.speed, "Recorded seconds per second, or max")
-      ->capture_default_str();
-  command.add_option("--log", o.output, "File for the events and decisions, one a line");
 }
 
 void declareExport(CLI::App& command, Options& o) {
@@ -135,56 +119,6 @@ Result<int> repair(const Options& o, Console& console) {
   return kDone;
 }
 
-Result<double> speedOf(const std::string& text) {
-  if (text == kAsFastAsItGoes) return std::numeric_limits<double>::infinity();
-  double speed = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), speed);
-  if (error == std::errc{} && end == text.data() + text.size() && std::isfinite(speed) &&
-      speed > 0.0) {
-    return speed;
-  }
-  return usageError("--speed " + text + ": must be a number above 0, or max");
-}
-
-Result<int> replay(const Options& o, Console& console) {
-  const auto speed = speedOf(o.speed);
-  if (!speed) return speed.error();
-  if (!o.output.empty()) {
-    if (auto free = checkOutputFile(o.output, "\"kind\":\"event\""); !free) return free.error();
-  }
-  EventLog log;
-  Progress progress(console);
-  ReplayOptions options;
-  options.speed = *speed;
-  options.interrupted = interrupted;
-  options.progress = [&](std::int64_t time_ns) {
-    progress.show(-1.0, "replaying, " + secondsText(seconds(time_ns)));
-  };
-  const auto summary = replaySession(o.session, options, log);
-  if (!summary) return summary.error();
-  if (!o.output.empty()) {
-    if (auto done = writeFileAtomically(o.output, log.text()); !done) return done.error();
-  }
-  const double recorded_s = seconds(summary->recorded_ns);
-  const double factor = recorded_s / std::max(summary->wall_s, 1e-9);
-  console.answer = {{"records", summary->records},
-                    {"logged", log.lines()},
-                    {"log", o.output},
-                    {"cut_bytes", summary->cut_bytes},
-                    {"recorded_s", recorded_s},
-                    {"wall_s", summary->wall_s},
-                    {"speed", factor},
-                    {"interrupted", summary->interrupted}};
-  if (summary->cut_bytes > 0) {
-    console.warn(o.session + ": its last " + std::to_string(summary->cut_bytes) +
-                 " bytes are torn and were left out");
-  }
-  if (summary->interrupted) console.warn("interrupted: the log ends early");
-  console.say(std::to_string(summary->records) + " records, " + secondsText(recorded_s) + " in " +
-              secondsText(summary->wall_s) + "; " + std::to_string(log.lines()) + " events");
-  return summary->interrupted ? static_cast<int>(ErrorKind::kNotConverged) : kDone;
-}
-
 Result<int> exportTo(const Options& o, Console& console) {
   const auto target = findSessionExport(o.target);
   if (!target) return target.error();
@@ -198,15 +132,14 @@ Result<int> exportTo(const Options& o, Console& console) {
 }  // namespace
 
 Verb sessionVerb() {
-  static constexpr std::array kRows = {
+  static const std::array kRows = {
       Verb{"info", "What a session holds",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSession, info); }},
       Verb{"verify", "Check every record and image; exit 3 if any is damaged",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSession, verify); }},
       Verb{"repair", "Cut a torn tail off, keep it beside, and say what it was",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSession, repair); }},
-      Verb{"replay", "Go through the records in their order and log the events",
-           [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareReplay, replay); }},
+      sessionReplay(),
       Verb{"export", "Write a session for other programs",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareExport, exportTo); }}};
   return {"session", "Recorded sessions", [](CLI::App& command, Action& action) {

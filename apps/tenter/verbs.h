@@ -23,6 +23,9 @@ Verb correlateVerb();
 Verb demoVerb();
 Verb versionVerb();
 
+// Rows of `tenter session` that are more than a line, session_<name>.cpp.
+Verb sessionReplay();
+
 // Rows of `tenter twin` that need devices, twin_<name>.cpp.
 Verb twinServe();
 Verb twinTruth();

@@ -3,18 +3,32 @@
 
 namespace tenter::daemon {
 
-bool Lease::acquire(std::uint64_t connection, const std::string& who, std::int64_t now_ns) {
+Lease::Taken Lease::acquire(std::uint64_t connection, const std::string& who, std::int64_t now_ns) {
   const std::lock_guard lock(mutex_);
-  if (connection_ != 0 && connection_ != connection && now_ns < until_ns_) return false;
+  const bool in_force = connection_ != 0 && now_ns < until_ns_;
+  if (in_force && connection_ != connection) return Taken::kRefused;
+  const Taken taken = in_force ? Taken::kKept : Taken::kNew;
   connection_ = connection;
   who_ = who;
   until_ns_ = now_ns + kLength_ns;
-  return true;
+  return taken;
+}
+
+bool Lease::heldByUser(const std::string& who, std::int64_t now_ns) const {
+  const std::lock_guard lock(mutex_);
+  return connection_ != 0 && who_ == who && now_ns < until_ns_;
 }
 
 bool Lease::renew(std::uint64_t connection, std::int64_t now_ns) {
   const std::lock_guard lock(mutex_);
   if (connection_ != connection || now_ns >= until_ns_) return false;
+  until_ns_ = now_ns + kLength_ns;
+  return true;
+}
+
+bool Lease::extend(std::uint64_t connection, std::int64_t now_ns) {
+  const std::lock_guard lock(mutex_);
+  if (connection_ != connection) return false;
   until_ns_ = now_ns + kLength_ns;
   return true;
 }

@@ -73,6 +73,8 @@ int run(int argc, char** argv) {
     setpgid(0, 0);
     prctl(PR_SET_PDEATHSIG, SIGTERM);
   }
+  // A file that may not grow is a disk that is full: the write says so, and the rig unloads.
+  std::signal(SIGXFSZ, SIG_IGN);
   return serve(config, socket, group);
 }
 

@@ -48,11 +48,15 @@ std::string Recorder::fault() const {
   return fault_;
 }
 
+std::int64_t Recorder::start_ns() const { return start_ns_; }
 std::string Recorder::folder() const { return writer_->folder().string(); }
 
 void Recorder::take(std::deque<Item> items) {
   for (const Item& item : items) {
-    const auto written = writer_->append(item.time_ns, item.body);
+    // What the machine went by need not wait for the disk one by one: its decisions do.
+    const bool is_input = std::holds_alternative<GenericRecord>(item.body);
+    const auto written =
+        writer_->append(item.time_ns, item.body, is_input ? Commit::kGroup : Commit::kByKind);
     if (written) continue;
     const std::lock_guard lock(mutex_);
     if (fault_.empty()) fault_ = written.error().message();

@@ -30,6 +30,7 @@ class Recorder {
   bool closed() const;
   std::string fault() const;  ///< Why nothing more can be written; empty if all is well.
   std::string folder() const;
+  std::int64_t start_ns() const;
 
  private:
   struct Item {

@@ -3,6 +3,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
 namespace tenter::daemon {
 namespace {
 
@@ -19,16 +21,6 @@ constexpr std::int64_t kReconnectPeriod_ns = 1'000'000'000;
 /// What keeps an axis from being moved, though it answers. A late order is cured by the next one.
 constexpr std::uint32_t kHarmless = actuator_error::kDeenergised | actuator_error::kCommandTimeout;
 
-TensionReading tensionOf(const CellInput& cell) {
-  TensionReading out{cell.gross_N, TensionStatus::kOk, std::max<std::int64_t>(0, cell.age_ns)};
-  if (cell.gross_N) return out;
-  out.status = cell.fault == "stale"        ? TensionStatus::kStale
-               : cell.fault == "over-range" ? TensionStatus::kOverRange
-               : cell.fault == "never-read" ? TensionStatus::kMissing
-                                            : TensionStatus::kFault;
-  return out;
-}
-
 nlohmann::json numberOrNull(const std::optional<double>& value) {
   nlohmann::json out;
   if (value) out = *value;
@@ -37,21 +29,40 @@ nlohmann::json numberOrNull(const std::optional<double>& value) {
 
 }  // namespace
 
+/// Calls of the devices do not last longer than twice their time-out; one that did is counted.
+template <class Call>
+auto RigService::timed(const char* name, Actuator::Timeout timeout, Call call) {
+  const auto start = std::chrono::steady_clock::now();
+  auto outcome = call();
+  const auto taken = std::chrono::steady_clock::now() - start;
+  if (taken > 2 * timeout) {
+    ++overlong_;
+    spdlog::warn("{}: took {} ms of {} ms", name,
+                 std::chrono::duration_cast<std::chrono::milliseconds>(taken).count(),
+                 timeout.count());
+  }
+  return outcome;
+}
+
 Result<std::unique_ptr<RigService>> RigService::start(RigConfig config) {
   std::vector<AxisConfig> axes;
   for (const RigAxis& axis : config.axes) axes.push_back(axis.device);
   auto bank = ActuatorBank::create(std::move(axes));
   if (!bank) return bank.error();
-  auto scanner = LoadCellScanner::start(config.cells, {});
+  auto events = std::make_shared<CellEvents>();
+  LoadCellScannerOptions options;
+  options.on_event = [events](const LoadCellEvent& event) { events->push(event); };
+  auto scanner = LoadCellScanner::start(config.cells, options);
   if (!scanner) return scanner.error();
   return std::unique_ptr<RigService>(
-      new RigService(std::move(config), *std::move(bank), *std::move(scanner)));
+      new RigService(std::move(config), *std::move(bank), std::move(events), *std::move(scanner)));
 }
 
-RigService::RigService(RigConfig config, ActuatorBank bank,
+RigService::RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<CellEvents> events,
                        std::unique_ptr<LoadCellScanner> scanner)
     : config_(config),
       bank_(std::move(bank)),
+      cell_events_(std::move(events)),
       scanner_(std::move(scanner)),
       machine_(std::move(config)),
       status_{{"rig", config_.name},
@@ -79,7 +90,7 @@ void RigService::watch() {
         trip_ = ForceTrip{static_cast<int>(i), gross_N.value_or(config_.cells[i].capacity_N)};
         armed_ = false;
       }
-      (void)bank_.haltAll(kDeviceTimeout);
+      (void)haltEverything();
     }
     std::this_thread::sleep_for(kWatchPeriod);
   }
@@ -90,7 +101,18 @@ void RigService::stopNow() {
     const std::lock_guard lock(halt_mutex_);
     stopped_ = true;
   }
-  (void)bank_.haltAll(kDeviceTimeout);
+  (void)haltEverything();
+}
+
+/// An axis that is not on the bus halts by itself; one that refused or did not answer is told again
+/// in the next tick.
+std::vector<AxisOutcome> RigService::haltEverything() {
+  std::vector<AxisOutcome> outcomes =
+      timed("halt", kDeviceTimeout, [&] { return bank_.haltAll(kDeviceTimeout); });
+  halt_again_ = std::any_of(outcomes.begin(), outcomes.end(), [](const AxisOutcome& outcome) {
+    return !outcome.ok() && outcome.fault != ActuatorFault::kUnplugged;
+  });
+  return outcomes;
 }
 
 Result<void> RigService::command(RigCommand command, std::shared_ptr<Recorder> recorder) {
@@ -98,9 +120,13 @@ Result<void> RigService::command(RigCommand command, std::shared_ptr<Recorder> r
   const std::uint64_t id = command.id = ++last_command_;
   waiting_[id].recorder = std::move(recorder);
   commands_.push_back(std::move(command));
-  const bool in_time =
-      answered_.wait_for(lock, kAnswerLimit, [&] { return waiting_[id].refusal.has_value(); });
-  const std::string refusal = in_time ? *waiting_[id].refusal : "the loop does not answer";
+  const auto answered = [&] { return waiting_[id].refusal.has_value(); };
+  if (!answered_.wait_for(lock, kAnswerLimit, answered)) {
+    // What the loop has not taken up it must not take up after this was answered.
+    std::erase_if(commands_, [&](const RigCommand& waiting) { return waiting.id == id; });
+    (void)answered_.wait_for(lock, kAnswerLimit, answered);
+  }
+  const std::string refusal = waiting_[id].refusal.value_or("the loop does not answer");
   waiting_.erase(id);
   if (!refusal.empty()) return Error{ErrorKind::kInterlock, "", "", refusal, ""};
   return {};
@@ -121,7 +147,7 @@ void RigService::loop(const std::function<void()>& each_tick) {
     if (!machine_.moving() || now - *quit_at > kQuitLimit) break;
   }
   armed_ = false;
-  (void)bank_.haltAll(kDeviceTimeout);
+  (void)haltEverything();
   recorder_.reset();
 }
 
@@ -137,11 +163,17 @@ void RigService::noteLateness(std::int64_t late_ns, std::int64_t now_ns) {
 
 void RigService::tick() {
   reconnect();
+  // Before anything is read, so that no session begins after its first tick.
+  std::vector<RigCommand> commands = takeCommands();
   RigTick tick = readAll();
-  takeCommands(tick);
+  tick.commands = std::move(commands);
+  takeHalts(tick);
   const bool was_moving = machine_.moving();
+  const RigMemory before = machine_.memory();
   const RigOrders orders = machine_.step(tick);
   obey(orders);
+  attach(orders, before);
+  noteFaults(tick);
   record(tick, orders);
   answer(orders);
   publish(tick);
@@ -182,7 +214,8 @@ AxisInput RigService::axisInput(const AxisReading& reading, bool& emergency) con
 
 RigTick RigService::readAll() {
   RigTick tick;
-  for (const AxisReading& reading : bank_.pollAll(kDeviceTimeout)) {
+  for (const AxisReading& reading :
+       timed("poll", kDeviceTimeout, [&] { return bank_.pollAll(kDeviceTimeout); })) {
     tick.axes.push_back(axisInput(reading, tick.emergency_stop));
   }
   const std::int64_t now_ns = monotonic_ns();
@@ -196,61 +229,106 @@ RigTick RigService::readAll() {
     tick.cells.push_back(std::move(cell));
   }
   tick.time_ns = now_ns;
-  tick.operator_gone = !operated_ && !quitting_;
+  const bool changed = operator_changed_.exchange(false);
+  tick.operator_gone = (!operated_ || changed) && !quitting_;
   if (recorder_) tick.recorder_fault = recorder_->fault();
   return tick;
 }
 
-void RigService::takeCommands(RigTick& tick) {
-  {
-    const std::lock_guard lock(halt_mutex_);
-    tick.trip = trip_;
-    tick.halted_outside = stopped_;
-    trip_.reset();
-    stopped_ = false;
-  }
+void RigService::takeHalts(RigTick& tick) {
+  const std::lock_guard lock(halt_mutex_);
+  tick.trip = trip_;
+  tick.halted_outside = stopped_;
+  trip_.reset();
+  stopped_ = false;
+}
+
+std::vector<RigCommand> RigService::takeCommands() {
+  std::vector<RigCommand> commands;
   {
     const std::lock_guard lock(command_mutex_);
-    tick.commands.swap(commands_);
+    commands.swap(commands_);
   }
   if (quitting_ && machine_.running()) {
     RigCommand abort;
     abort.kind = Kind::kAbort;
-    tick.commands.push_back(abort);
+    commands.push_back(abort);
   }
+  return commands;
 }
 
 void RigService::release() {
   const std::lock_guard lock(halt_mutex_);
-  if (!trip_ && !stopped_) bank_.allowMotion();
+  if (trip_ || stopped_) return;
+  halt_again_ = false;
+  bank_.allowMotion();
 }
 
 void RigService::obey(const RigOrders& orders) {
-  if (orders.halt) {
-    (void)bank_.haltAll(kDeviceTimeout);
-    return;
-  }
-  if (orders.deenergise) (void)bank_.deenergiseAll(kEnergiseTimeout);
+  if (orders.halt || (halt_again_ && !orders.release_halt)) return note(haltEverything());
+  if (orders.deenergise) note(bank_.deenergiseAll(kEnergiseTimeout));
   if (orders.release_halt) release();
   for (int i = 0; i < bank_.size(); ++i) {
     if (!orders.energise && !orders.home) break;
-    // A device that refuses shows in its next reading.
     if (orders.energise) {
-      (void)bank_.axis(i).energise(kEnergiseTimeout);
-      (void)bank_.axis(i).exitSafeStart(kEnergiseTimeout);
+      note({bank_.axis(i).energise(kEnergiseTimeout),
+            bank_.axis(i).exitSafeStart(kEnergiseTimeout)});
     }
-    if (orders.home) (void)bank_.axis(i).goHome(HomeTowards::kMin, kEnergiseTimeout);
+    if (orders.home) note({bank_.axis(i).goHome(HomeTowards::kMin, kEnergiseTimeout)});
   }
-  (void)bank_.setTargets(orders.targets_m, kDeviceTimeout);
+  note(timed("targets", kDeviceTimeout,
+             [&] { return bank_.setTargets(orders.targets_m, kDeviceTimeout); }));
+}
+
+/// Orders that were not carried out. Those that a halt forbids or cuts short are as they should be.
+void RigService::note(const std::vector<AxisOutcome>& outcomes) {
+  for (const AxisOutcome& outcome : outcomes) {
+    const ActuatorFault fault = outcome.fault;
+    if (fault == ActuatorFault::kNone || fault == ActuatorFault::kHalted ||
+        fault == ActuatorFault::kPreempted) {
+      continue;
+    }
+    noteFault(outcome.axis, std::string(actuatorFaultName(fault)), outcome.detail);
+  }
+}
+
+/// What devices say, whether or not the machine has to act upon it.
+void RigService::noteFaults(const RigTick& tick) {
+  for (std::size_t i = 0; i < tick.axes.size(); ++i) {
+    if (!tick.axes[i].fault.empty()) noteFault(config_.axes[i].device.name, tick.axes[i].fault, "");
+  }
+  for (const LoadCellEvent& event : cell_events_->take()) {
+    if (event.fault == LoadCellFault::kNone) continue;
+    std::string name(loadCellFaultName(event.fault));
+    if (event.exception_code != 0) name += "-" + std::to_string(event.exception_code);
+    noteFault(config_.cells.at(event.cell).id, name, std::string(loadCellFaultText(event.fault)));
+  }
+}
+
+void RigService::noteFault(const std::string& source, const std::string& fault,
+                           const std::string& text) {
+  const std::int64_t now_ns = monotonic_ns();
+  if (!named_.isNews(source, fault, now_ns)) return;
+  spdlog::warn("device: {}: {} {}", source, fault, text);
+  if (recorder_) recorder_->append(now_ns, FaultEvent{source, fault, text});
+}
+
+/// A run's own records go to its session.
+void RigService::attach(const RigOrders& orders, const RigMemory& before) {
+  const std::lock_guard lock(command_mutex_);
+  for (const RigAnswer& answer : orders.answers) {
+    const auto waiting = waiting_.find(answer.id);
+    if (waiting == waiting_.end() || !waiting->second.recorder) continue;
+    if (!answer.refusal.empty()) continue;
+    recorder_ = waiting->second.recorder;
+    journal_ = RigJournal();
+    named_.forget();
+    recorder_->append(recorder_->start_ns(),
+                      RigJournal::memoryRecord(before, recorder_->start_ns()));
+  }
 }
 
 void RigService::record(const RigTick& tick, const RigOrders& orders) {
-  for (const RigAnswer& answer : orders.answers) {  // the run's own records go to its session
-    const std::lock_guard lock(command_mutex_);
-    const auto waiting = waiting_.find(answer.id);
-    if (waiting == waiting_.end() || !waiting->second.recorder) continue;
-    if (answer.refusal.empty()) recorder_ = waiting->second.recorder;
-  }
   for (const RecordBody& body : orders.records) {
     if (const auto* state = std::get_if<StateChange>(&body)) {
       spdlog::info("state: {} -> {} ({})", state->from, state->to, state->reason);
@@ -261,10 +339,9 @@ void RigService::record(const RigTick& tick, const RigOrders& orders) {
     }
   }
   if (!recorder_) return;
-  SampleRecord sample;
-  for (const AxisInput& axis : tick.axes) sample.positions_m.push_back(axis.position_m);
-  for (const CellInput& cell : tick.cells) sample.tensions.push_back(tensionOf(cell));
-  recorder_->append(tick.time_ns, std::move(sample));
+  for (RecordBody& body : journal_.tickRecords(tick)) {
+    recorder_->append(tick.time_ns, std::move(body));
+  }
   for (const RecordBody& body : orders.records) recorder_->append(tick.time_ns, body);
   if (!orders.run_ended) return;
   recorder_->close(tick.time_ns);
@@ -301,15 +378,20 @@ void RigService::publish(const RigTick& tick) {
   }
   for (std::size_t i = 0; i < tick.cells.size(); ++i) {
     const CellInput& cell = tick.cells[i];
+    const LoadCellScanStatistics scans = scanner_->statistics(i);
     nlohmann::json net_N;
     if (cell.gross_N) net_N = *cell.gross_N - machine_.tares_N()[i];
     status["cells"].push_back({{"name", config_.cells[i].id},
                                {"gross_N", numberOrNull(cell.gross_N)},
                                {"net_N", net_N},
                                {"age_ms", 1e-6 * static_cast<double>(cell.age_ns)},
+                               {"scan_ms", 1e-6 * static_cast<double>(scans.mean_ns)},
+                               {"longest_scan_ms", 1e-6 * static_cast<double>(scans.longest_ns)},
                                {"fault", cell.fault}});
   }
+  status["time_ns"] = tick.time_ns;
   status["loop"] = {{"ticks", ticks_},
+                    {"overlong_calls", overlong_.load()},
                     {"missed", missed_},
                     {"worst_late_ms", 1e-6 * static_cast<double>(worst_late_ns_)}};
   const std::lock_guard lock(status_mutex_);

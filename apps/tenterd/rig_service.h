@@ -12,10 +12,11 @@
 #include <thread>
 #include <vector>
 
+#include "fault_names.h"
 #include "recorder.h"
 #include "tenter/rig/actuator_bank.h"
 #include "tenter/rig/load_cell_scanner.h"
-#include "tenter/rig/rig_machine.h"
+#include "tenter/rig/rig_journal.h"
 
 namespace tenter::daemon {
 
@@ -40,6 +41,8 @@ class RigService {
   Result<void> command(RigCommand command, std::shared_ptr<Recorder> recorder = nullptr);
   /// Whether somebody holds the rig; without, what moves is ended.
   void setOperated(bool operated) { operated_ = operated; }
+  /// Somebody else holds it from now on: what moves is ended too.
+  void operatorChanged() { operator_changed_ = true; }
   nlohmann::json status() const;
   const RigConfig& config() const { return config_; }
 
@@ -49,14 +52,23 @@ class RigService {
     std::shared_ptr<Recorder> recorder;
   };
 
-  RigService(RigConfig config, ActuatorBank bank, std::unique_ptr<LoadCellScanner> scanner);
+  RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<CellEvents> events,
+             std::unique_ptr<LoadCellScanner> scanner);
   void tick();
   RigTick readAll();
+  void noteFaults(const RigTick& tick);
+  void note(const std::vector<AxisOutcome>& outcomes);
+  void noteFault(const std::string& source, const std::string& fault, const std::string& text);
   AxisInput axisInput(const AxisReading& reading, bool& emergency) const;
-  void takeCommands(RigTick& tick);
+  std::vector<RigCommand> takeCommands();
+  void takeHalts(RigTick& tick);
   void obey(const RigOrders& orders);
+  std::vector<AxisOutcome> haltEverything();
   void release();
+  void attach(const RigOrders& orders, const RigMemory& before);
   void record(const RigTick& tick, const RigOrders& orders);
+  template <class Call>
+  auto timed(const char* name, Actuator::Timeout timeout, Call call);
   void answer(const RigOrders& orders);
   void publish(const RigTick& tick);
   void noteLateness(std::int64_t late_ns, std::int64_t now_ns);
@@ -65,9 +77,12 @@ class RigService {
 
   RigConfig config_;
   ActuatorBank bank_;
+  std::shared_ptr<CellEvents> cell_events_;
   std::unique_ptr<LoadCellScanner> scanner_;
   RigMachine machine_;
-  std::atomic<bool> quitting_{false}, operated_{false}, armed_{false};
+  std::atomic<bool> quitting_{false}, operated_{false}, armed_{false}, operator_changed_{false};
+  /// A device did not confirm that it halted: it is told again, and not kept alive meanwhile.
+  std::atomic<bool> halt_again_{false};
 
   std::mutex halt_mutex_;  ///< Of what halts from outside the loop.
   std::optional<ForceTrip> trip_;
@@ -79,10 +94,13 @@ class RigService {
   std::map<std::uint64_t, Waiting> waiting_;
   std::uint64_t last_command_ = 0;
   std::shared_ptr<Recorder> recorder_;
+  RigJournal journal_;  ///< Of the session that recorder_ writes.
+  FaultNames named_;
 
   mutable std::mutex status_mutex_;
   nlohmann::json status_;
   std::uint64_t ticks_ = 0, missed_ = 0;
+  std::atomic<std::uint64_t> overlong_{0};  ///< Calls beyond twice their time-out.
   std::int64_t worst_late_ns_ = 0;
   unsigned arrivals_ = 0;
   std::int64_t next_reconnect_ns_ = 0;

@@ -24,13 +24,16 @@ constexpr std::size_t kMaxText = 256, kMaxProtocol_bytes = 512 * 1024;
 struct PlainRow {
   std::string_view method;
   Kind kind;
+  /// Also from another program of the user who holds the lease: a second terminal beside the run.
+  bool beside_the_run = false;
 };
 /// Commands without parameters, for whoever holds the lease.
-constexpr std::array kPlain{PlainRow{"enable", Kind::kEnable}, PlainRow{"disable", Kind::kDisable},
-                            PlainRow{"home", Kind::kHome},     PlainRow{"tare", Kind::kTare},
-                            PlainRow{"pause", Kind::kPause},   PlainRow{"resume", Kind::kResume},
-                            PlainRow{"abort", Kind::kAbort},   PlainRow{"reset", Kind::kReset},
-                            PlainRow{"unload", Kind::kUnload}};
+constexpr std::array kPlain{
+    PlainRow{"enable", Kind::kEnable},     PlainRow{"disable", Kind::kDisable},
+    PlainRow{"home", Kind::kHome},         PlainRow{"tare", Kind::kTare},
+    PlainRow{"pause", Kind::kPause, true}, PlainRow{"resume", Kind::kResume, true},
+    PlainRow{"abort", Kind::kAbort, true}, PlainRow{"reset", Kind::kReset},
+    PlainRow{"unload", Kind::kUnload}};
 
 const PlainRow* findPlain(std::string_view method) {
   const auto row = std::find_if(kPlain.begin(), kPlain.end(),
@@ -108,10 +111,12 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
   }
   if (method == "status") return status();
   if (method == "lease") {
-    if (!lease_.acquire(client.connection, client.user, now_ns)) {
+    const Lease::Taken taken = lease_.acquire(client.connection, client.user, now_ns);
+    if (taken == Lease::Taken::kRefused) {
       return Error{ErrorKind::kInterlock, "", "", lease_.holder(now_ns) + " operates the rig",
                    "anybody may stop it"};
     }
+    if (taken == Lease::Taken::kNew) service_.operatorChanged();
     tick();
     return Json{{"seconds", 1e-9 * static_cast<double>(Lease::kLength_ns)}};
   }
@@ -123,13 +128,15 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
   if (row == nullptr && method != "jog" && method != "run") {
     return usageError("there is no method \"" + method + "\"");
   }
-  if (!lease_.heldBy(client.connection, now_ns)) {
+  const bool beside =
+      row != nullptr && row->beside_the_run && lease_.heldByUser(client.user, now_ns);
+  if (!beside && !lease_.heldBy(client.connection, now_ns)) {
     return Error{ErrorKind::kInterlock, "", "", "this client does not operate the rig",
                  "call lease first"};
   }
   spdlog::info("{} by {}", method, client.user);
   if (row != nullptr) return plain(row->kind);
-  return method == "jog" ? jog(params) : run(params);
+  return method == "jog" ? jog(params) : run(params, client);
 }
 
 Result<Json> Rpc::status() const {
@@ -166,7 +173,7 @@ Result<Json> Rpc::jog(const Json& params) {
   return Json::object();
 }
 
-Result<Json> Rpc::run(const Json& params) {
+Result<Json> Rpc::run(const Json& params, const Client& client) {
   JsonReader in(params, "params");
   const std::string text = in.text("protocol", kMaxProtocol_bytes);
   const std::string folder = in.text("session", 4096);
@@ -181,11 +188,17 @@ Result<Json> Rpc::run(const Json& params) {
   if (!in.ok()) return in.error();
   auto writer = SessionWriter::create(folder, header);
   if (!writer) return writer.error();
+  // A busy disk may have taken longer than the lease lasts, and the client waited for it.
+  const bool still_operates = lease_.extend(client.connection, monotonic_ns());
+  tick();
   RigCommand command;
   command.kind = Kind::kRun;
   command.protocol = std::make_shared<CaptureProtocol>(*protocol);
   auto recorder = std::make_shared<Recorder>(*std::move(writer), monotonic_ns());
-  if (auto done = service_.command(command, recorder); !done) {
+  auto done = still_operates ? service_.command(command, recorder)
+                             : Error{ErrorKind::kInterlock, "", "",
+                                     "this client does not operate the rig", ""};
+  if (!done) {
     recorder.reset();
     std::error_code ignored;  // what is left then holds its two records and says so
     std::filesystem::remove_all(folder, ignored);

@@ -6,10 +6,9 @@
 #include <set>
 #include <utility>
 
-#include "register_map_toml.h"
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
-#include "toml_keys.h"
+#include "tenter/rig/toml_document.h"
 
 namespace tenter {
 namespace {

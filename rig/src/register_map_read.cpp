@@ -4,10 +4,10 @@
 #include <initializer_list>
 #include <numeric>
 
-#include "register_map_toml.h"
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
 #include "tenter/rig/register_map.h"
+#include "tenter/rig/toml_document.h"
 
 namespace tenter {
 namespace {

@@ -5,11 +5,10 @@
 #include <map>
 #include <set>
 
-#include "register_map_toml.h"
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
 #include "tenter/rig/shipped_files.h"
-#include "toml_keys.h"
+#include "tenter/rig/toml_document.h"
 
 namespace tenter {
 namespace {
@@ -43,15 +42,16 @@ RigLimits readLimits(JsonReader in) {
 /// Maps are read once each, by name.
 class MapShelf {
  public:
-  explicit MapShelf(fs::path folder) : folder_(std::move(folder)) {}
+  /// Without a folder there are no maps.
+  explicit MapShelf(std::optional<fs::path> folder) : folder_(std::move(folder)) {}
 
   std::shared_ptr<const RegisterMap> get(JsonReader& in) {
     const std::string name = in.text("map", 512);
-    if (!in.ok()) return nullptr;
+    if (!in.ok() || !folder_) return nullptr;
     if (const auto known = maps_.find(name); known != maps_.end()) return known->second;
     const ShippedFile* shipped = findShippedFile(shippedRegisterMaps(), name);
     const Result<RegisterMap> map = shipped != nullptr ? parseRegisterMap(shipped->text, name)
-                                                       : readRegisterMap(folder_ / name);
+                                                       : readRegisterMap(*folder_ / name);
     if (!map) {
       std::string names;
       for (const ShippedFile& file : shippedRegisterMaps()) {
@@ -64,11 +64,11 @@ class MapShelf {
   }
 
  private:
-  fs::path folder_;
+  std::optional<fs::path> folder_;
   std::map<std::string, std::shared_ptr<const RegisterMap>> maps_;
 };
 
-void readCells(JsonReader& in, RigConfig& rig, const fs::path& folder) {
+void readCells(JsonReader& in, RigConfig& rig, const std::optional<fs::path>& folder) {
   MapShelf maps(folder);
   const std::size_t size = in.arraySize("cell");
   if (in.ok() && (size == 0 || size > kMaxAxes)) in.fail("cell", "must be there 1 to 64 times");
@@ -155,6 +155,28 @@ RigAxis readAxis(JsonReader entry, const RigConfig& rig) {
   return axis;
 }
 
+Result<RigConfig> parse(std::string_view toml, const std::string& file,
+                        const std::optional<fs::path>& map_folder) {
+  const auto json = jsonOfToml(toml, file);
+  if (!json) return json.error();
+  JsonReader in(*json, file);
+  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell"}, kPage);
+  in.integer("schema_version", 1, 1);
+  RigConfig rig;
+  rig.text = toml;
+  rig.name = in.text("name", kMaxName);
+  rig.limits = readLimits(in.object("limits"));
+  if (!in.ok()) return in.error();
+  readCells(in, rig, map_folder);
+  const std::size_t size = in.arraySize("axis");
+  if (in.ok() && (size == 0 || size > kMaxAxes)) in.fail("axis", "must be there 1 to 64 times");
+  for (std::size_t i = 0; i < size && in.ok(); ++i) {
+    rig.axes.push_back(readAxis(in.element("axis", i), rig));
+  }
+  if (!in.ok()) return in.error();
+  return rig;
+}
+
 }  // namespace
 
 double speedCap_m_per_s(const RigLimits& limits) {
@@ -175,24 +197,11 @@ Result<RigConfig> readRigConfig(const fs::path& file) {
 }
 
 Result<RigConfig> parseRigConfig(std::string_view toml, const fs::path& file) {
-  const auto json = jsonOfToml(toml, file.string());
-  if (!json) return json.error();
-  JsonReader in(*json, file.string());
-  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell"}, kPage);
-  in.integer("schema_version", 1, 1);
-  RigConfig rig;
-  rig.text = toml;
-  rig.name = in.text("name", kMaxName);
-  rig.limits = readLimits(in.object("limits"));
-  if (!in.ok()) return in.error();
-  readCells(in, rig, file.parent_path());
-  const std::size_t size = in.arraySize("axis");
-  if (in.ok() && (size == 0 || size > kMaxAxes)) in.fail("axis", "must be there 1 to 64 times");
-  for (std::size_t i = 0; i < size && in.ok(); ++i) {
-    rig.axes.push_back(readAxis(in.element("axis", i), rig));
-  }
-  if (!in.ok()) return in.error();
-  return rig;
+  return parse(toml, file.string(), file.parent_path());
+}
+
+Result<RigConfig> parseRecordedRigConfig(std::string_view toml) {
+  return parse(toml, "session.json: rig_configuration", std::nullopt);
 }
 
 }  // namespace tenter

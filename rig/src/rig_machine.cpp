@@ -37,6 +37,22 @@ std::string_view rigStateName(RigState state) {
   return kStateNames[static_cast<std::size_t>(state)];
 }
 
+std::optional<RigState> findRigState(std::string_view name) {
+  const auto found = std::find(kStateNames.begin(), kStateNames.end(), name);
+  if (found == kStateNames.end()) return std::nullopt;
+  return static_cast<RigState>(found - kStateNames.begin());
+}
+
+std::string_view rigCommandName(RigCommand::Kind kind) {
+  return kCommandNames[static_cast<std::size_t>(kind)];
+}
+
+std::optional<RigCommand::Kind> findRigCommand(std::string_view name) {
+  const auto found = std::find(kCommandNames.begin(), kCommandNames.end(), name);
+  if (found == kCommandNames.end()) return std::nullopt;
+  return static_cast<Kind>(found - kCommandNames.begin());
+}
+
 RigMachine::RigMachine(RigConfig config)
     : config_(std::move(config)), cap_m_per_s_(speedCap_m_per_s(config_.limits)) {
   setpoints_m_.resize(config_.axes.size());
@@ -47,6 +63,29 @@ RigMachine::RigMachine(RigConfig config)
   begun_m_.resize(config_.axes.size());
   known_m_.resize(config_.axes.size());
   tares_N_.resize(config_.cells.size());
+}
+
+RigMachine::RigMachine(RigConfig config, const RigMemory& memory) : RigMachine(std::move(config)) {
+  require(memory.axes.size() == axes_.size() && memory.heard_ns.size() == axes_.size() &&
+              memory.known_m.size() == axes_.size() && memory.felt_ns.size() == felt_ns_.size() &&
+              memory.tares_N.size() == tares_N_.size(),
+          "RigMachine: a memory of this rig");
+  state_ = memory.state;
+  reason_ = memory.reason;
+  enabled_ = memory.enabled;
+  emergency_ = memory.emergency;
+  blind_ = memory.blind;
+  last_ns_ = memory.last_ns;
+  axes_ = memory.axes;
+  heard_ns_ = memory.heard_ns;
+  known_m_ = memory.known_m;
+  felt_ns_ = memory.felt_ns;
+  tares_N_ = memory.tares_N;
+}
+
+RigMemory RigMachine::memory() const {
+  return {state_, reason_,   enabled_, emergency_, blind_,  last_ns_,
+          axes_,  heard_ns_, known_m_, felt_ns_,   tares_N_};
 }
 
 RigOrders RigMachine::step(const RigTick& tick) {
@@ -266,7 +305,7 @@ void RigMachine::settleIdleState() {
 
 void RigMachine::obey(const RigCommand& command) {
   const std::string refusal = refusalOf(command);
-  const auto name = kCommandNames[static_cast<std::size_t>(command.kind)];
+  const std::string_view name = rigCommandName(command.kind);
   orders_->answers.push_back({command.id, refusal});
   orders_->records.emplace_back(
       OperatorEvent{std::string(name), refusal.empty() ? "" : "refused: " + refusal});
@@ -306,15 +345,36 @@ std::string RigMachine::refusalOf(const RigCommand& command) const {
     case Kind::kHome:
       break;
   }
-  if (!calm) return no;
+  return calm ? refusalOfHome() : no;
+}
+
+/// Homing is for slack cords. An axis that lost its count, as a device does without power, may
+/// count no way left though its cord pulls, and only homing lets that out; cords whose axes stand
+/// at their ends may pull along with it.
+std::string RigMachine::refusalOfHome() const {
+  std::string loaded;
+  bool any_lost = false;
   for (std::size_t i = 0; i < config_.cells.size(); ++i) {
+    const std::string& name = config_.cells[i].id;
     const auto tension_N = net_N(i);
-    if (!tension_N || *tension_N > config_.limits.slack_N) {
-      return config_.cells[i].id +
-             (tension_N ? " is under load: unload first" : " gives no tension");
-    }
+    if (!tension_N) return name + " gives no tension";
+    if (*tension_N <= config_.limits.slack_N) continue;
+    const std::optional<std::size_t> axis = axisAtItsEnd(static_cast<int>(i));
+    if (!axis) return name + " is under load: unload first";
+    any_lost = any_lost || !axes_[*axis].position_certain;
+    loaded = name;
   }
-  return "";
+  return loaded.empty() || any_lost ? "" : loaded + " is under load: unload first";
+}
+
+/// The axis of a cell, if by its count it cannot let out any more.
+std::optional<std::size_t> RigMachine::axisAtItsEnd(int cell) const {
+  for (std::size_t i = 0; i < config_.axes.size(); ++i) {
+    if (config_.axes[i].cell != cell) continue;
+    const double end_m = config_.axes[i].device.travel_min_m + config_.limits.following_error_m;
+    if (known_m_[i] <= end_m) return i;
+  }
+  return std::nullopt;
 }
 
 std::string RigMachine::refusalOfJog(const RigCommand& command) const {

@@ -12,6 +12,7 @@ namespace {
 constexpr double kSettle_s = 0.1;  // a halted axis stands, and its cells have read that
 constexpr double kHomeFirst_s = 0.3;
 constexpr double kHomeLimit_s = 120.0, kUnloadLimit_s = 120.0;
+constexpr double kSlackShare = 0.8;  // of slack_N, so that noise does not make it a load again
 constexpr int kTareTicks = 25;
 constexpr double kMaxTareShare = 0.2;  // of the working force; more is a load, not a tare
 constexpr double kArrived_m = 1e-9;
@@ -102,7 +103,20 @@ void RigMachine::actJog() {
   move(velocities);
 }
 
+/// A switch that stays pressed would let its axis draw in without end, looking for where it is let
+/// go. A count that jumps to its zero at the end is no way.
+bool RigMachine::homesAstray(std::size_t axis) {
+  const AxisInput& input = axes_[axis];
+  if (!input.homing || !input.position_m) return false;
+  begun_m_[axis] = std::min(begun_m_[axis], *input.position_m);
+  return *input.position_m - begun_m_[axis] > config_.limits.following_error_m;
+}
+
 void RigMachine::actHome() {
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    if (!homesAstray(i)) continue;
+    return trip(config_.axes[i].device.name, "homing-astray", "does not leave its limit switch");
+  }
   if (seconds() < kHomeFirst_s) return;
   const bool done = std::all_of(axes_.begin(), axes_.end(), [](const AxisInput& axis) {
     return !axis.homing && axis.position_certain;
@@ -154,8 +168,9 @@ void RigMachine::actUnload() {
     const RigAxis& axis = config_.axes[i];
     if (!axis.cell) continue;
     const auto tension_N = net_N(static_cast<std::size_t>(*axis.cell));
-    if (tension_N ? *tension_N <= config_.limits.slack_N : setpoints_m_[i] <= origins_m_[i])
-      continue;
+    const bool slack = tension_N ? *tension_N <= kSlackShare * config_.limits.slack_N
+                                 : setpoints_m_[i] <= origins_m_[i];
+    if (slack) continue;
     const AxisInput& input = axes_[i];
     if (!input.energised || !input.fault.empty() || !input.position_m) {
       left += (left.empty() ? "" : ", ") + axis.device.name + " does not move";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tic_actuator.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +11,9 @@ namespace {
 using namespace tic;  // NOLINT(google-build-using-namespace): this file is the Tic's
 
 constexpr double kSlowestSpeedUnits = 7.0;  // the device takes 0 to 6 as 0
+// Of the axis' largest speed. The device's own 100 microsteps a second take minutes for a rig's
+// travel; away from the switch it goes slowly, because there it finds its zero.
+constexpr double kHomingShare = 0.5, kHomingAwayShare = 0.05;
 
 UsbRequest statusRequest() {
   return UsbRequest::controlIn(command::kGetVariable, 0, variable::kStatusLength);
@@ -57,6 +61,13 @@ std::vector<UsbRequest> settingChanges(const AxisConfig& config,
   want(setting::kCommandTimeout_ms, static_cast<std::uint8_t>(timeout_ms & 0xFF));
   want(setting::kCommandTimeout_ms + 1, static_cast<std::uint8_t>(timeout_ms >> 8));
   want(setting::kSoftErrorResponse, kHalt);
+  const auto wantSpeed = [&](int offset, double speed_m_per_s) {
+    const double units = std::max(std::abs(speedUnits(config, speed_m_per_s)), kSlowestSpeedUnits);
+    const auto value = static_cast<std::uint32_t>(units);
+    for (int i = 0; i < 4; ++i) want(offset + i, static_cast<std::uint8_t>(value >> (8 * i)));
+  };
+  wantSpeed(setting::kHomingTowards, kHomingShare * config.max_speed_m_per_s);
+  wantSpeed(setting::kHomingAway, kHomingAwayShare * config.max_speed_m_per_s);
   // Always: a setting may have been written by a program that was killed before this request.
   requests.push_back(UsbRequest::controlOut(command::kReinitialise));
   requests.push_back(request32(

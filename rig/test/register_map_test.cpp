@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "register_map_toml.h"
 #include "tenter/core/files.h"
+#include "tenter/rig/toml_document.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
 

@@ -5,6 +5,9 @@
 
 #include "machine_bench.h"
 #include "tenter/rig/shipped_files.h"
+#include "tenter/rig/toml_document.h"
+#include "tenter/test_support/data.h"
+#include "tenter/test_support/json_schema.h"
 
 namespace tenter::rig_test {
 namespace {
@@ -105,6 +108,37 @@ TEST(ShippedProtocolsTest, AreAllReadableAndNamedAsTheirFiles) {
   EXPECT_THAT(names, testing::UnorderedElementsAre("stretch-weft", "stretch-warp", "shear",
                                                    "bend-weft", "bend-warp", "bend-bias",
                                                    "complex-shear", "corner-pull"));
+}
+
+std::vector<std::string> bySchema(std::string_view toml, const char* schema) {
+  return test_support::schemaErrors(*jsonOfToml(toml, "a.toml"),
+                                    test_support::sourceFolder() / "docs/formats" / schema);
+}
+
+TEST(RigSchemaTest, HoldsForWhatIsReadAndRefusesWhatIsNot) {
+  EXPECT_THAT(bySchema(benchToml(), "rig.schema.json"), testing::IsEmpty());
+  for (const Breach& breach :
+       {Breach{"schema_version = 1", "schema_version = 2", "", ""},
+        Breach{"slack_N", "slak_N", "", ""}, Breach{"travel_m = [0.0, 0.08]", "", "", ""},
+        Breach{"address = \"tcp", "address = \"udp", "", ""}}) {
+    EXPECT_THAT(bySchema(replaced(benchToml(), breach), "rig.schema.json"),
+                testing::Not(testing::IsEmpty()))
+        << breach.to;
+  }
+}
+
+TEST(ProtocolSchemaTest, HoldsForWhatShipsAndRefusesWhatIsNotRead) {
+  for (const ShippedFile& file : shippedProtocols()) {
+    EXPECT_THAT(bySchema(file.text, "protocol.schema.json"), testing::IsEmpty()) << file.name;
+  }
+  EXPECT_THAT(bySchema(benchProtocolToml(), "protocol.schema.json"), testing::IsEmpty());
+  for (const Breach& breach : {Breach{"limit_m = 0.05", "", "", ""},
+                               Breach{"hold_s = 0.2", "hold_s = 0.2\nforce_N = 1.0", "", ""},
+                               Breach{"end = \"hold\"", "end = \"rest\"", "", ""}}) {
+    EXPECT_THAT(bySchema(replaced(benchProtocolToml(), breach), "protocol.schema.json"),
+                testing::Not(testing::IsEmpty()))
+        << breach.from;
+  }
 }
 
 }  // namespace

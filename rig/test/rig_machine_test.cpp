@@ -333,5 +333,31 @@ TEST(RigMachineTest, AForceThatIsNeverReachedEndsTheRun) {
   EXPECT_TRUE(bench.hasFault("force-not-reached"));
 }
 
+TEST(RigMachineTest, HomesUnderLoadOnlyWhatHasLostItsCount) {
+  MachineBench bench;
+  bench.enable();
+  bench.extra_N = 1.0;
+  bench.position_m = {0.0005, 0.01};  // the first cord cannot be let out any further
+  bench.goal_m = bench.position_m;
+  bench.step();
+  EXPECT_THAT(bench.command(Kind::kHome), HasSubstr("under load"));
+  bench.tick.axes[0].position_certain = false;
+  bench.steps(2);
+  EXPECT_EQ(bench.command(Kind::kHome), "");
+}
+
+TEST(RigMachineTest, ASwitchThatStaysPressedEndsTheHoming) {
+  MachineBench bench;
+  bench.enable();
+  ASSERT_EQ(bench.command(Kind::kHome), "");
+  bench.tick.axes[1].homing = true;
+  bench.steps(20);
+  EXPECT_EQ(bench.machine.state(), RigState::kRunning);
+  bench.goal_m[1] = bench.position_m[1] + 0.002;  // away from the switch, and on
+  bench.steps(60);
+  EXPECT_TRUE(bench.hasFault("homing-astray"));
+  EXPECT_EQ(bench.machine.state(), RigState::kFault);
+}
+
 }  // namespace
 }  // namespace tenter::rig_test

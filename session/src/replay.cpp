@@ -85,6 +85,13 @@ std::string eventLine(const JournalRecord& record) {
   return "{" + std::string(rest);
 }
 
+Result<std::string> eventLine(std::int64_t time_ns, const RecordBody& body,
+                              const SessionHeader& header) {
+  auto encoded = encodeRecord(time_ns, body, header);
+  if (!encoded) return encoded.error();
+  return "{" + *std::move(encoded);
+}
+
 Result<void> EventLog::consume(const JournalRecord& record) {
   if (!isEvent(record.body)) return {};
   text_ += eventLine(record);

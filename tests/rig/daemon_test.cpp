@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 #include <filesystem>
 
 #include "running_rig.h"
+#include "tenter/rig/redecide.h"
 #include "tenter/session/replay.h"
 #include "tenter/session/session_reader.h"
 
@@ -56,6 +58,19 @@ std::string logOf(const std::string& session) {
   const auto summary = replaySession(session, {}, log);
   EXPECT_TRUE(summary.ok());
   return log.text();
+}
+
+/// The same again from the recorded inputs, and much faster than it happened.
+void expectReplays(const std::string& session) {
+  constexpr double kLeastSpeed = 20.0;
+  Redecider redecider;
+  const auto summary = replaySession(session, {}, redecider);
+  ASSERT_TRUE(summary.ok()) << summary.error().message();
+  EXPECT_TRUE(redecider.decided());
+  EXPECT_TRUE(redecider.identical()) << "line " << redecider.firstDifference();
+  EXPECT_EQ(redecider.text(), logOf(session));
+  EXPECT_GT(redecider.ticks(), 10U);
+  EXPECT_LT(summary->wall_s * kLeastSpeed, 1e-9 * static_cast<double>(summary->recorded_ns));
 }
 
 using Positions = std::array<double, ServedRig::kAxes>;
@@ -116,6 +131,7 @@ void runsAWholeSession(bool tcp) {
   EXPECT_THAT(log, HasSubstr("\"how\":\"done\""));
   EXPECT_THAT(log, HasSubstr("\"name\":\"unloaded\""));
   EXPECT_EQ(log, logOf(session));
+  expectReplays(session);
   EXPECT_EQ(running.status()["state"], "ready");
 }
 
@@ -142,6 +158,7 @@ TEST(TenterdTest, AForceBeyondTheLimitHaltsAllAxes) {
     EXPECT_THAT(logOf(session), HasSubstr("\"fault\":\"absolute-force\""));
     EXPECT_THAT(logOf(session), HasSubstr("\"name\":\"unloaded\""));
     EXPECT_TRUE(verifySession(session)->ok());
+    expectReplays(session);
     ASSERT_EQ(running.tenterRig({"reset"}), 0);
   }
   std::sort(times_ms.begin(), times_ms.end());
@@ -173,6 +190,8 @@ TEST(TenterdTest, AnybodysStopHaltsAndAKilledDaemonIsOutlivedByTheDevicesTimeout
   ASSERT_TRUE(report.ok());
   EXPECT_TRUE(report->ok());
   EXPECT_FALSE(report->closed);
+  expectReplays(running.path("one"));
+  expectReplays(running.path("two"));
 }
 
 TEST(TenterdTest, AVanishedOperatorEndsTheRunInUnloading) {
@@ -202,6 +221,44 @@ TEST(TenterdTest, TheSocketIsForItsGroupAndOneOperator) {
   EXPECT_EQ(running.tenterRig({"jog", "axis-1", "--by-mm", "-1"}), 7);
   EXPECT_EQ(running.tenterRig({"stop"}), 0);
   EXPECT_EQ(RunningRig::wait(client), 7);
+}
+
+TEST(TenterdTest, ASecondTerminalPausesResumesAndAborts) {
+  RunningRig running;
+  const std::string protocol = running.write("all.toml", kAllAxes);
+  const std::string session = running.path("session");
+  const pid_t client = running.startTenterRig({"run", protocol, "-o", session});
+  ASSERT_TRUE(waitUntilAllPull(running, session));
+  EXPECT_EQ(running.tenterRig({"pause"}), 0);
+  EXPECT_EQ(running.status()["state"], "paused");
+  EXPECT_LE(restingTime_ms(running, 0.3), 100.0);
+  EXPECT_EQ(running.tenterRig({"pause"}), 7) << "it is paused";
+  EXPECT_EQ(running.tenterRig({"resume"}), 0);
+  const Positions before = positions(running);
+  EXPECT_TRUE(waitFor(5.0, [&] { return positions(running)[0] > before[0] + 100.0; }));
+  EXPECT_EQ(running.tenterRig({"abort"}), 0);
+  EXPECT_EQ(RunningRig::wait(client), 0);
+  EXPECT_THAT(logOf(session), HasSubstr("\"how\":\"aborted\""));
+  EXPECT_THAT(logOf(session), HasSubstr("\"name\":\"unloaded\""));
+  expectReplays(session);
+  EXPECT_EQ(running.tenterRig({"abort"}), 7) << "nothing is under way";
+}
+
+TEST(TenterdTest, AUserOutsideTheGroupIsRefused) {
+  if (geteuid() != 0) GTEST_SKIP() << "becoming another user takes root";
+  constexpr const char* kProgram = TENTER_PROGRAM;
+  RunningRig running;
+  namespace fs = std::filesystem;
+  fs::permissions(fs::path(running.socket()).parent_path(), fs::perms(0755));
+  const auto asNobody = [&] {
+    return *running.rig().usb().run({"setpriv", "--reuid=65534", "--regid=65534", "--clear-groups",
+                                     kProgram, "rig", "--socket", running.socket(), "status"},
+                                    running.path("nobody"));
+  };
+  EXPECT_EQ(asNobody(), 6) << "the socket's mode";
+  fs::permissions(running.socket(), fs::perms(0666));
+  EXPECT_EQ(asNobody(), 6) << "the peer's credentials";
+  EXPECT_EQ(running.tenterRig({"status"}), 0);
 }
 
 }  // namespace

@@ -27,9 +27,22 @@ RunningRig::RunningRig(bool tcp) {
   options.state = folder_.path();
   options.tcp = tcp;
   rig_ = valueOf(ServedRig::start(options));
+  startDaemon();
+}
+
+std::string RunningRig::log() const { return path("daemon-" + std::to_string(starts_) + ".log"); }
+
+void RunningRig::restartDaemon() {
+  kill(daemon_, SIGKILL);
+  wait(daemon_);
+  std::filesystem::remove(socket());
+  startDaemon();
+}
+
+void RunningRig::startDaemon() {
+  ++starts_;
   daemon_ = valueOf(rig_->usb().spawn(
-      {TENTER_DAEMON, "--config", rig_->configFile().string(), "--socket", socket()},
-      path("daemon.log")));
+      {TENTER_DAEMON, "--config", rig_->configFile().string(), "--socket", socket()}, log()));
   if (!waitFor(10.0, [&] { return std::filesystem::is_socket(socket()); })) {
     throw std::runtime_error("no socket");
   }

@@ -21,6 +21,9 @@ class RunningRig {
 
   ServedRig& rig() { return *rig_; }
   pid_t daemon() const { return daemon_; }
+  /// Kills the daemon, if it still runs, and starts another one with a log of its own.
+  void restartDaemon();
+  std::string log() const;  ///< The path of the daemon's log.
   std::string path(const std::string& name) const { return folder_ / name; }
   std::string socket() const { return folder_ / "tenterd.sock"; }
 
@@ -33,9 +36,12 @@ class RunningRig {
   std::string write(const std::string& name, const std::string& text);
 
  private:
+  void startDaemon();
+
   test_support::TemporaryFolder folder_;
   std::unique_ptr<ServedRig> rig_;
   pid_t daemon_ = -1;
+  int starts_ = 0;
 };
 
 /// Polls every half millisecond; false after the limit.

@@ -298,6 +298,7 @@ VirtualActuatorState VirtualTic::state() const {
   state.velocity_units_per_s = jammed_ ? 0.0 : velocity_;
   state.counted_units = counted_;
   state.energised = operation_ == ActuatorState::kSoftError || operation_ == ActuatorState::kNormal;
+  state.homing = homing_ != Homing::kNone;
   return state;
 }
 

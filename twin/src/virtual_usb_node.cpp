@@ -114,6 +114,7 @@ void VirtualUsbNode::detach() {
 }
 
 void VirtualUsbNode::drop(const Urb& urb) {
+  g_object_unref(urb.owner);
   g_object_unref(urb.buffer);
   g_object_unref(urb.data);
 }
@@ -211,7 +212,9 @@ bool VirtualUsbNode::submit(UMockdevIoctlClient* client) {
   const std::uint8_t direction = control ? buffer.bytes()[0] : urb.endpoint;
   const VirtualUsbDevice::Transfer transfer =
       device_.begin(control, (direction & kIn) != 0, buffer.bytes());
-  urbs_.push_back({client, data.keep(), buffer.keep(), transfer});
+  // Held: a client that goes unseen must not leave its address, and its transfers, to the next.
+  auto* owner = static_cast<UMockdevIoctlClient*>(g_object_ref(client));
+  urbs_.push_back({owner, data.keep(), buffer.keep(), transfer});
   return answer(client, 0, 0);
 }
 

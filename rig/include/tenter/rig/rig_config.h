@@ -49,5 +49,7 @@ struct RigConfig {
 /// this one. No axis is configured faster than the speed cap.
 Result<RigConfig> readRigConfig(const std::filesystem::path& file);
 Result<RigConfig> parseRigConfig(std::string_view toml, const std::filesystem::path& file);
+/// One that a session holds: its register maps are not looked for, cells have none.
+Result<RigConfig> parseRecordedRigConfig(std::string_view toml);
 
 }  // namespace tenter

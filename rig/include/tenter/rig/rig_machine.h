@@ -25,6 +25,7 @@ enum class RigState {
   kStopped,  ///< Somebody stopped it: holds where it is until `reset`.
 };
 std::string_view rigStateName(RigState state);
+std::optional<RigState> findRigState(std::string_view name);
 
 struct AxisInput {
   std::optional<double> position_m;
@@ -62,6 +63,9 @@ struct RigCommand {
   std::shared_ptr<const CaptureProtocol> protocol;  ///< kRun
 };
 
+std::string_view rigCommandName(RigCommand::Kind kind);
+std::optional<RigCommand::Kind> findRigCommand(std::string_view name);
+
 /// A force beyond the absolute limit that a faster watch saw, and halted for, between two ticks.
 struct ForceTrip {
   int cell = 0;
@@ -97,6 +101,20 @@ struct RigOrders {
   bool run_ended = false;  ///< Unloading included: the session may be closed.
 };
 
+/// All that a machine at rest goes by besides the next tick: with it another one goes on as the
+/// first would have. Times as in its ticks.
+struct RigMemory {
+  RigState state = RigState::kOff;
+  std::string reason;
+  bool enabled = false, emergency = false, blind = false;
+  std::optional<std::int64_t> last_ns;
+  std::vector<AxisInput> axes;                        ///< The last readings that count.
+  std::vector<std::optional<std::int64_t>> heard_ns;  ///< Of each axis, when it last answered.
+  std::vector<double> known_m;                        ///< Last positions read.
+  std::vector<std::int64_t> felt_ns;                  ///< Of each cell, its last tension.
+  std::vector<double> tares_N;
+};
+
 /// The safety state machine with the runner of protocols inside: pure, so that equal ticks give
 /// equal orders, byte for byte. The rules, and what happens under each, stand in
 /// docs/rig-safety.md.
@@ -106,6 +124,8 @@ class RigMachine {
   static constexpr std::int64_t kLateTick_ns = 200'000'000;
 
   explicit RigMachine(RigConfig config);
+  /// Goes on where another one was. Precondition: sizes of the configuration.
+  RigMachine(RigConfig config, const RigMemory& memory);
 
   /// Precondition: one input for each axis and each cell.
   RigOrders step(const RigTick& tick);
@@ -116,6 +136,8 @@ class RigMachine {
   bool running() const { return protocol_ != nullptr; }
   const std::vector<double>& tares_N() const { return tares_N_; }
   const RigConfig& config() const { return config_; }
+  /// Complete while nothing moves and no tare is taken.
+  RigMemory memory() const;
 
  private:
   enum class Activity { kNone, kSettle, kJog, kHome, kRun, kUnload, kTare };
@@ -135,6 +157,8 @@ class RigMachine {
   void obey(const RigCommand& command);
   std::string refusalOf(const RigCommand& command) const;
   void carryOut(const RigCommand& command);
+  std::string refusalOfHome() const;
+  std::optional<std::size_t> axisAtItsEnd(int cell) const;
   std::string refusalOfJog(const RigCommand& command) const;
   std::string refusalOfRun(const RigCommand& command) const;
   // rig_motion.cpp: what is to be done
@@ -143,6 +167,7 @@ class RigMachine {
   void startUnloading();
   void actJog();
   void actHome();
+  bool homesAstray(std::size_t axis);
   void actTare();
   void actUnload();
   void actRun();

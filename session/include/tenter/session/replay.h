@@ -47,6 +47,11 @@ Result<ReplaySummary> replaySession(const std::filesystem::path& folder,
 /// samples lie between.
 std::string eventLine(const JournalRecord& record);
 
+/// The same of a record that is not in a journal: as the writer would have put it there. Error: a
+/// value that the format has no place for.
+Result<std::string> eventLine(std::int64_t time_ns, const RecordBody& body,
+                              const SessionHeader& header);
+
 /// Collects the eventLine of every record that isEvent(), each with a line end.
 class EventLog : public RecordConsumer {
  public:

@@ -34,6 +34,7 @@ struct VirtualActuatorState {
   double velocity_units_per_s = 0.0;
   double counted_units = 0.0;  ///< What the device believes: lost steps are the difference.
   bool energised = false;
+  bool homing = false;
   bool plugged = true;
   long transfers = 0;  ///< Answered or refused since the start.
 };

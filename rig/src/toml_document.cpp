@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "register_map_toml.h"
+#include "tenter/rig/toml_document.h"
 
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -74,6 +75,16 @@ Result<Json> jsonOfToml(std::string_view toml, const std::string& file) {
   } catch (const toml::parse_error& error) {
     return badInput(file, placeOf(error.source().begin),
                     "is not valid TOML: " + std::string(error.description()));
+  }
+}
+
+void onlyKnownKeys(JsonReader& in, std::initializer_list<std::string_view> keys,
+                   const std::string& page) {
+  if (!in.ok() || !in.json().is_object()) return;
+  for (const auto& [key, value] : in.json().items()) {
+    if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
+      in.fail(key, "is not a key here", "see " + page);
+    }
   }
 }
 
