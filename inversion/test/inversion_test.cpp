@@ -88,13 +88,6 @@ TEST(InversionTest, FixedVerticesMayPull) {
   expectCertified(invert(problem, {}));
 }
 
-TEST(InversionTest, MaterialsWithCurvesAndDirectionsAreFirstClass) {
-  for (const char* law : {"soft", "stvk", "stvk-coupled"}) {
-    SCOPED_TRACE(law);
-    expectCertified(invert(standing(8, shellMaterial(law, 400.0)), {}));
-  }
-}
-
 /// A sheet that lies on a plane of that slope.
 InversionProblem onSlope(double tangent, double friction) {
   InversionProblem problem;

@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 #include "running_rig.h"
@@ -35,10 +37,11 @@ pid_t startCapture(const std::string& folder, const std::vector<std::string>& ar
 
 bool programWith(const std::string& argument) {
   for (const auto& entry : fs::directory_iterator("/proc")) {
-    std::error_code ignored;
-    if (!fs::exists(entry.path() / "cmdline", ignored)) continue;
-    const auto line = readFile(entry.path() / "cmdline", 1 << 16);
-    if (line && line->find(argument) != std::string::npos) return true;
+    // Not readFile(): what /proc holds says that it is empty.
+    std::ifstream file(entry.path() / "cmdline", std::ios::binary);
+    const std::string line((std::istreambuf_iterator<char>(file)),
+                           std::istreambuf_iterator<char>());
+    if (line.find(argument) != std::string::npos) return true;
   }
   return false;
 }

@@ -14,7 +14,7 @@ namespace {
 using rig_system_test::waitFor;
 
 constexpr double kRecovery_s = 60.0;
-constexpr double kPull_m = 0.005, kPullSpeed_m_per_s = 0.002;
+constexpr double kPull_m = 0.009, kPullSpeed_m_per_s = 0.002;
 constexpr double kJog_m = 0.006, kJogSpeed_m_per_s = 0.002;
 constexpr double kHomingWay_m = 0.0015, kFast_m_per_s = 0.004;
 constexpr double kUnloadingBegins_s = 0.13;

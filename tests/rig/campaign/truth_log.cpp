@@ -34,7 +34,7 @@ TruthLog::Look TruthLog::look() const {
   for (int i = 0; i < ServedRig::kAxes; ++i) {
     const auto at = static_cast<std::size_t>(i);
     now.position_m[at] = rig_.usb().state(i).position_units * ServedRig::kMetresPerMicrostep;
-    now.tension_N[at] = rig_.tension_N(i);
+    now.tension_N[at] = rig_.felt_N(i);
   }
   now.time_ns = monotonic_ns();
   return now;
