@@ -5,7 +5,7 @@
     bench/inversion_cases.py build/release/bin/tenter OUT [--only skirt,page] [--time-budget 60] [--table FILE.md]
 
 The shapes are generated: surfaces of revolution and their like in metres, resting on analytic bodies. Materials and
-friction are those of the paper times the factor of each case, the smallest power of two that is certified here.
+friction are those of the paper times a factor for each case: a guess, and not every case is certified with it.
 """
 import argparse
 import json
