@@ -16,7 +16,7 @@ packages=(
   libusb-1.0-0-dev libumockdev-dev umockdev libmodbus-dev libsystemd-dev
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-numpy python3-jsonschema
-  opencv-doc poppler-utils
+  opencv-doc
   python3-usb usbutils mbpoll python3-pymodbus python3-serial-asyncio
   clang-16 libclang-rt-16-dev  # scripts/fuzz.sh
 )

@@ -58,4 +58,20 @@ Result<Material> materialOf(const MaterialOptions& o) {
   return material;
 }
 
+Result<SimulatedMaterial> simulatedMaterialOf(const MaterialOptions& o) {
+  auto material = materialOf(o);
+  if (!material) return material.error();
+  const auto model = findClothModel(material->law);
+  if (!model) {
+    return badInput(
+        o.file, "law",
+        "is " + material->law +
+            ", whose tabulated forces belong to no energy, and an equilibrium is a minimum of one",
+        "use it in its own program, or fit a law of tenter to measurements of the fabric");
+  }
+  auto laws = makeLaws(**model, *material);
+  if (!laws) return laws.error().in(o.file);
+  return SimulatedMaterial{*std::move(material), *model, *std::move(laws)};
+}
+
 }  // namespace tenter::app

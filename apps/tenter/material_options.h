@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "tenter/mechanics/cloth_models.h"
 #include "tenter/mechanics/material.h"
 
 namespace tenter::app {
@@ -21,5 +22,14 @@ void declareMaterial(CLI::App& command, MaterialOptions& o);
 /// The material that was given, with a positive areal density. Usage error unless it is given in
 /// one way, and wholly.
 Result<Material> materialOf(const MaterialOptions& o);
+
+/// A material with the model and the laws that it is simulated by.
+struct SimulatedMaterial {
+  Material material;
+  const ClothModel* model = nullptr;
+  ClothLaws laws;
+};
+/// As materialOf(); refuses laws whose forces are no energy's, such as ARCSim's tables.
+Result<SimulatedMaterial> simulatedMaterialOf(const MaterialOptions& o);
 
 }  // namespace tenter::app

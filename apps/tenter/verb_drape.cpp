@@ -51,18 +51,8 @@ void declare(CLI::App& command, Options& o) {
 Result<ClothSystem> systemOf(const Options& o) {
   const auto gravity = parseNumbers(o.gravity, 3, "--gravity");
   if (!gravity) return gravity.error();
-  const auto material = materialOf(o.material);
+  const auto material = simulatedMaterialOf(o.material);
   if (!material) return material.error();
-  const auto model = findClothModel(material->law);
-  if (!model) {
-    return badInput(
-        o.material.file, "law",
-        "is " + material->law +
-            ", whose tabulated forces belong to no energy, and a drape is a minimum of one",
-        "drape it in its own program, or fit a law of tenter to measurements of the fabric");
-  }
-  const auto laws = makeLaws(**model, *material);
-  if (!laws) return laws.error().in(o.material.file);
   const auto file = readMesh(o.mesh);
   if (!file) return file.error();
   if (auto valid = validateMesh(file->mesh); !valid) return valid.error().in(o.mesh);
@@ -74,29 +64,15 @@ Result<ClothSystem> systemOf(const Options& o) {
   auto fixed = selectVertices(o.fix, file->mesh);
   if (!fixed) return fixed.error();
   setup.fixed_nodes = std::move(fixed).value();
-  setup.areal_density_kg_per_m2 = material->areal_density_kg_per_m2;
+  setup.areal_density_kg_per_m2 = material->material.areal_density_kg_per_m2;
   setup.gravity_m_per_s2 = Vec3((*gravity)[0], (*gravity)[1], (*gravity)[2]);
-  const bool isotropic = (*model)->membrane == MembraneElement::kEdges;
+  const bool isotropic = material->model->membrane == MembraneElement::kEdges;
   auto sheet = sheetFromMesh(file->mesh, isotropic);
   if (!sheet) return sheet.error().in(o.mesh);
-  auto system = ClothSystem::create(std::move(sheet).value(), **model, *laws, std::move(setup));
+  auto system = ClothSystem::create(std::move(sheet).value(), *material->model, material->laws,
+                                    std::move(setup));
   if (!system) return system.error().file.empty() ? system.error().in(o.mesh) : system.error();
   return system;
-}
-
-/// Green strain (E_uu, E_vv, 2 E_uv) of every triangle.
-Eigen::MatrixXd greenStrains(const SheetMesh& sheet, const Points3& x) {
-  Eigen::MatrixXd strains(3, sheet.triangleCount());
-  for (int t = 0; t < sheet.triangleCount(); ++t) {
-    const Triangle& ids = sheet.rest.triangles[static_cast<std::size_t>(t)];
-    Eigen::Matrix<double, 3, 2> edges;
-    edges << x.col(ids[1]) - x.col(ids[0]), x.col(ids[2]) - x.col(ids[0]);
-    const Eigen::Matrix<double, 3, 2> f =
-        edges * sheet.triangles[static_cast<std::size_t>(t)].edges_inverse;
-    const Mat2 c = f.transpose() * f;
-    strains.col(t) << 0.5 * (c(0, 0) - 1.0), 0.5 * (c(1, 1) - 1.0), c(0, 1);
-  }
-  return strains;
 }
 
 Result<void> writeDraped(const std::string& file, const ClothSystem& system,

@@ -55,16 +55,9 @@ void declare(CLI::App& command, Options& o) {
 Result<ShellMaterial> shellMaterialOf(const Options& o) {
   const auto gravity = parseNumbers(o.gravity, 3, "--gravity");
   if (!gravity) return gravity.error();
-  const auto material = materialOf(o.material);
+  const auto material = simulatedMaterialOf(o.material);
   if (!material) return material.error();
-  const auto model = findClothModel(material->law);
-  if (!model) {
-    return badInput(o.material.file, "law",
-                    "is " + material->law + ", which cannot be simulated here");
-  }
-  const auto laws = makeLaws(**model, *material);
-  if (!laws) return laws.error().in(o.material.file);
-  return ShellMaterial{*model, *laws, material->areal_density_kg_per_m2,
+  return ShellMaterial{material->model, material->laws, material->material.areal_density_kg_per_m2,
                        Vec3((*gravity)[0], (*gravity)[1], (*gravity)[2])};
 }
 

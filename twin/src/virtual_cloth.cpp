@@ -59,20 +59,6 @@ SheetMesh sampleSheet(GridLines lines, bool on_bias) {
   return sheet;
 }
 
-Eigen::Matrix3Xd greenStrains(const SheetMesh& sheet, const Eigen::Ref<const Points3>& positions) {
-  Eigen::Matrix3Xd out(3, sheet.triangleCount());
-  for (int t = 0; t < sheet.triangleCount(); ++t) {
-    const Triangle& ids = sheet.rest.triangles[t];
-    Eigen::Matrix<double, 3, 2> edges;
-    edges << positions.col(ids[1]) - positions.col(ids[0]),
-        positions.col(ids[2]) - positions.col(ids[0]);
-    const Eigen::Matrix<double, 3, 2> w = edges * sheet.triangles[t].edges_inverse;
-    out.col(t) << 0.5 * (w.col(0).squaredNorm() - 1.0), 0.5 * (w.col(1).squaredNorm() - 1.0),
-        w.col(0).dot(w.col(1));
-  }
-  return out;
-}
-
 TriangleMesh trackedMesh(int per_side, bool on_bias) {
   return sampleSheet({linesThrough(0.0, kSampleSide_m, per_side, {}),
                       linesThrough(0.0, kSampleSide_m, per_side, {}), DiagonalPattern::kUniform},

@@ -29,9 +29,6 @@ void turnMaterial(SheetMesh& sheet, double angle_rad);
 SheetMesh sampleSheet(GridLines lines, bool on_bias);
 Vec2 materialPoint(Vec2 place, bool on_bias);  ///< (u, v) of a place on the flat sample.
 
-/// Strains (E_u, E_v, 2 E_uv) of every triangle.
-Eigen::Matrix3Xd greenStrains(const SheetMesh& sheet, const Eigen::Ref<const Points3>& positions);
-
 /// One frame without noise. Parts are as in MeasurementFrame.
 struct ExactFrame {
   MeasurementFrame reading;

@@ -58,4 +58,7 @@ SheetMesh unstructuredSheet(const Vec2& size_m, double edge_m, std::uint64_t see
 /// triangle gets any frame.
 Result<SheetMesh> sheetFromMesh(const TriangleMesh& mesh, bool isotropic);
 
+/// Green strains (E_uu, E_vv, 2 E_uv) of every triangle: 3 x triangles. `positions`: 3 x nodes [m].
+Eigen::Matrix3Xd greenStrains(const SheetMesh& sheet, const Eigen::Ref<const Points3>& positions);
+
 }  // namespace tenter
