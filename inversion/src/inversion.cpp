@@ -100,7 +100,6 @@ class Inverter {
     polish.progress = [this](int k, double r) {
       say("forces in cones: %.0f, residual %.3g", k, r);
     };
-    polish.worthwhile = 0.9;
     polish.patience = 4;
     double last = std::numeric_limits<double>::infinity();
     for (int outer = 0; outer < kMaxOuter && !stopped(); ++outer) {
