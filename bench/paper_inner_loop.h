@@ -11,7 +11,7 @@ namespace tenter::bench {
 /// What [Est12]'s inner loop has cost, over all frames and threads.
 struct PaperCounts {
   std::atomic<long> equilibria{0}, steps{0}, gradient_steps{0}, unconverged{0};
-  std::atomic<double> seconds{0.0};  ///< Summed over threads.
+  std::atomic<double> cpu_seconds{0.0};  ///< Summed over threads.
 };
 
 /// One cloth measurement whose equilibria are found as [Est12] sec. 5.1 says: always from the

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -93,10 +94,17 @@ class SimulatedTest : public FitTest {
     FrameOutcome outcome;
     Eigen::MatrixXf tangent;  ///< dofs x parameters of the system, empty if unknown.
   };
+  using Curves = std::vector<ComponentCurve>;
+  /// Where a frame's own start led, and the curves that it was solved with.
+  struct FromStart {
+    ClothState state;
+    std::shared_ptr<const Curves> curves;
+  };
   struct Frame {
     int replica = 0, source = 0;
     bool weighed = false;
     Solution accepted, current;
+    std::optional<FromStart> from_start;
   };
 
   using Bases = std::vector<std::shared_ptr<const SplineBasis>>;
@@ -110,6 +118,11 @@ class SimulatedTest : public FitTest {
   FrameOutcome solveFrom(Simulation& simulation, std::vector<ClothState> starts, int max_iterations,
                          ClothState& state) const;
   static void polish(Simulation& simulation, ClothState& state);
+  /// The equilibrium that the frame's own start leads to: followed from where it led with curves
+  /// that hardly differed, otherwise found anew.
+  FrameOutcome solveFromStart(Simulation& simulation, int frame, int max_iterations,
+                              ClothState& state);
+  void rememberStart(Frame& frame, const ClothState& state) const;
   /// Brings the frame's current solution up to date, factorised if derivatives are wanted. dofs x
   /// parameters, or empty.
   Eigen::MatrixXd solve(Simulation& simulation, int frame, bool with_derivatives,
@@ -120,6 +133,7 @@ class SimulatedTest : public FitTest {
   FitTestOptions options_;
   std::shared_ptr<SwitchableLaw> membrane_law_, bending_law_;
   Bases bases_;
+  std::shared_ptr<const Curves> curves_;  ///< Null where laws were given instead.
   bool require_proof_ = true;
   int generation_ = 0;  ///< Counts changes of the parameters' structure.
   Eigen::VectorXd parameters_;
