@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kMarker = "# Cloth preset written by tenter";
 constexpr double kForceScale = 1000.0;  // edge stiffness [N/m] = 1000 tension / edge
-constexpr double kBendScale = 100.0;    // moment of a hinge [N m] = 100 bending edge theta
+constexpr double kBendScale = 50.0;     // moment of a hinge [N m] = 50 bending edge^2 theta
 constexpr double kLargestSetting = 10000.0;
 
 struct Settings {
@@ -66,7 +66,7 @@ Settings settingsOf(const SheetResponse& response, double edge_m) {
   s.tension = bestMembrane(response, false) * edge_m / kForceScale;
   s.compression = s.tension;
   s.shear = bestMembrane(response, true) * edge_m / kForceScale;
-  s.bending = bestBending(response) / (kBendScale * edge_m);
+  s.bending = bestBending(response) / (kBendScale * edge_m * edge_m);
   s.mass_kg = response.material().areal_density_kg_per_m2 * edge_m * edge_m;
   return s;
 }
@@ -107,7 +107,6 @@ void noteLosses(ExportedMaterial& exported, const Settings& s) {
   lost.emplace_back(
       "at the boundary of a sheet an edge has quads on one side only but the full "
       "spring and the full vertex mass: borders are twice as stiff and heavy");
-  lost.emplace_back("the factor of bending is derived from the program's formula, not measured");
   const double largest = std::max({s.tension, s.shear, s.bending});
   if (largest > kLargestSetting) {
     lost.emplace_back("a setting exceeds the 10000 that the program allows; use a finer mesh");
@@ -122,7 +121,9 @@ Result<ExportedMaterial> make(const Material& material, const ExportOptions& opt
   exported.content = presetOf(s, material);
   setErrors(
       exported, *response, [&](const Vec3& green) { return latticeStress(s, green); },
-      [&](double /*angle*/, double kappa) { return kBendScale * s.bending * s.edge_m * kappa; });
+      [&](double /*angle*/, double kappa) {
+        return kBendScale * s.bending * s.edge_m * s.edge_m * kappa;
+      });
   noteLosses(exported, s);
   noteWindow(exported, *response);
   return exported;

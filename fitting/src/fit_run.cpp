@@ -26,7 +26,9 @@ constexpr double kFinalTolerance = 1e-6;
 constexpr int kEarlyIterations = 10;
 /// Rounds over the blocks end when none lowers its cost by more than this share, or than this many
 /// misfits per residual: a gain of x of those moves the curves by sqrt(2 x) standard deviations.
-constexpr double kSettledGain = 1e-4, kSettledMisfits = 0.05;
+/// Where the model cannot meet the data and not noise is what is left, the share grows with the
+/// misfit, up to the 1 % of [Est12] sec. 5.1.
+constexpr double kSettledGain = 1e-4, kSettledMisfits = 0.05, kMostSettledGain = 1e-2;
 constexpr int kMaxPasses = 6;
 constexpr double kRefitGain = 0.2;
 /// A first guess may be far off; that is not noise.
@@ -284,7 +286,8 @@ double FitRun::negligibleGain() const {
   for (const FrameId& id : evaluator_.frames())
     residuals += tests_[id.test]->residualCount(id.frame);
   const double misfit = 2.0 * last_.cost / static_cast<double>(std::max(1L, residuals));
-  return std::max(kSettledGain * last_.initial_cost, kSettledMisfits * misfit);
+  const double share = std::min(kSettledGain * std::max(1.0, misfit), kMostSettledGain);
+  return std::max(share * last_.initial_cost, kSettledMisfits * misfit);
 }
 
 /// Block after block, until a round changes nothing any more: what one block gives, the next takes

@@ -172,11 +172,16 @@ double setting(const std::string& preset, const std::string& name) {
   return std::stod(preset.substr(preset.find('=', at) + 1));
 }
 
-TEST(BlenderExport, TensionAndMassFollowTheEdge) {
+TEST(BlenderExport, StiffnessAndMassFollowTheEdge) {
   Material m = linearMaterial("soft");
   m.find("stretch_warp")->curve = StiffnessCurve::constant(kWeft);
+  const double bend = 3e-6;
+  for (const char* direction : {"bend_weft", "bend_warp"})
+    m.find(direction)->curve = StiffnessCurve::constant(bend, true);
   const double h = 0.01;
   const ExportedMaterial e = exported(m, "blender", h);
+  // Measured in the program by bench/blender_factors.py.
+  EXPECT_NEAR(setting(e.content, "bending_stiffness"), bend / (50 * h * h), 1e-6 * bend / (h * h));
   EXPECT_NEAR(setting(e.content, "tension_stiffness"), kWeft * h / 1000, 1e-6 * kWeft * h / 1000);
   EXPECT_NEAR(setting(e.content, "mass"), 0.2 * h * h, 1e-12);
   EXPECT_NEAR(setting(e.content, "shear_stiffness"), kShear * h / 1000, 1e-4 * kShear * h / 1000);
