@@ -26,8 +26,8 @@ constexpr double kWidthOfLength = 1.0 / 3.0;
 
 class CantileverTest final : public SimulatedTest {
  public:
-  CantileverTest(const Measurement& m, const ClothModel& model, const FitTestOptions& options,
-                 StripSheet strip);
+  CantileverTest(std::shared_ptr<const Measurement> m, const ClothModel& model,
+                 const FitTestOptions& options, StripSheet strip);
 
   int residualCount(int /*frame*/) const override { return 2; }
   std::vector<int> observedComponents(const ClothModel& model) const override;
@@ -60,16 +60,17 @@ class CantileverTest final : public SimulatedTest {
   double spacing_m_;
 };
 
-CantileverTest::CantileverTest(const Measurement& m, const ClothModel& model,
+CantileverTest::CantileverTest(std::shared_ptr<const Measurement> shared, const ClothModel& model,
                                const FitTestOptions& options, StripSheet strip)
-    : SimulatedTest(m, model, options),
+    : SimulatedTest(std::move(shared), model, options),
       s_(strip.s),
       along_(strip.along),
-      tip_nodes_(strip.nodesBetween(m.cantilever->length_m, m.cantilever->length_m)),
+      tip_nodes_(strip.nodesBetween(measurement().cantilever->length_m,
+                                    measurement().cantilever->length_m)),
       spacing_m_(-strip.s.minCoeff() / kStubColumns) {
   SystemSetup setup;
-  setup.areal_density_kg_per_m2 = m.areal_density_kg_per_m2;
-  setup.gravity_m_per_s2 = Vec3(0.0, 0.0, -m.gravity_m_per_s2.norm());
+  setup.areal_density_kg_per_m2 = measurement().areal_density_kg_per_m2;
+  setup.gravity_m_per_s2 = Vec3(0.0, 0.0, -measurement().gravity_m_per_s2.norm());
   setup.clips.resize(1);
   setup.clips[0].id = "clamp";
   setup.clips[0].nodes = strip.nodesBetween(s_.minCoeff(), 0.0);
@@ -165,8 +166,10 @@ void CantileverTest::fill(const SolvedFrame& solved, FramePrediction& prediction
 
 }  // namespace
 
-Result<std::unique_ptr<FitTest>> makeCantileverTest(const Measurement& m, const ClothModel& model,
+Result<std::unique_ptr<FitTest>> makeCantileverTest(std::shared_ptr<const Measurement> measurement,
+                                                    const ClothModel& model,
                                                     const FitTestOptions& options) {
+  const Measurement& m = *measurement;
   const CantileverSetup& setup = *m.cantilever;
   if (!(setup.length_m > 0.0))
     return badInput(m.name, "cantilever.length_m", "the strip has no length");
@@ -184,7 +187,8 @@ Result<std::unique_ptr<FitTest>> makeCantileverTest(const Measurement& m, const 
       makeStrip(model, along, equalLines(-0.5 * width_m, 0.5 * width_m, across - 1),
                 setup.angle_rad, options.diagonals);
   if (!strip) return strip.error().in(m.name);
-  auto test = std::make_unique<CantileverTest>(m, model, options, std::move(*strip));
+  auto test =
+      std::make_unique<CantileverTest>(std::move(measurement), model, options, std::move(*strip));
   if (const Result<void> tried = test->tryReplica(); !tried.ok()) return tried.error();
   return std::unique_ptr<FitTest>(std::move(test));
 }

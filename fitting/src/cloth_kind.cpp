@@ -62,8 +62,9 @@ Eigen::MatrixXd everyForce(int clips) {
 
 class ClothTest final : public SimulatedTest {
  public:
-  ClothTest(const Measurement& m, const ClothModel& model, const FitTestOptions& options)
-      : SimulatedTest(m, model, options), family_(protocolFamily(m)) {}
+  ClothTest(std::shared_ptr<const Measurement> m, const ClothModel& model,
+            const FitTestOptions& options)
+      : SimulatedTest(std::move(m), model, options), family_(protocolFamily(measurement())) {}
 
   /// Builds replicas and frames.
   Result<void> prepare();
@@ -348,9 +349,10 @@ void ClothTest::fill(const SolvedFrame& solved, FramePrediction& prediction) con
 
 }  // namespace
 
-Result<std::unique_ptr<FitTest>> makeClothTest(const Measurement& m, const ClothModel& model,
+Result<std::unique_ptr<FitTest>> makeClothTest(std::shared_ptr<const Measurement> measurement,
+                                               const ClothModel& model,
                                                const FitTestOptions& options) {
-  auto test = std::make_unique<ClothTest>(m, model, options);
+  auto test = std::make_unique<ClothTest>(std::move(measurement), model, options);
   if (const Result<void> prepared = test->prepare(); !prepared.ok()) return prepared.error();
   return std::unique_ptr<FitTest>(std::move(test));
 }

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "fit_residuals.h"
+#include "fit_tests.h"
 #include "frame_evaluator.h"
 #include "law_band.h"
 
@@ -86,7 +87,8 @@ Result<std::vector<double>> lawVariance(const std::vector<FramePrediction>& fram
     largest = std::max(largest, std::abs(frame.summary_predicted));
   std::vector<double> difference(frames.size(), 0.0);
   for (const Predictor& alternative : alternatives) {
-    Result<std::unique_ptr<FitTest>> test = makeFitTest(m, *alternative.model, options.test);
+    Result<std::unique_ptr<FitTest>> test =
+        makeFitTest(borrowed(m), *alternative.model, options.test);
     if (!test) return test.error();
     alternative.apply(**test);
     const std::vector<FramePrediction> other = predictFrames(**test, false, options.threads);
@@ -127,7 +129,7 @@ bool hasForces(const std::vector<FramePrediction>& frames) {
 Result<EvaluatedTest> evaluateOne(const Material& material, const Predictor& predictor,
                                   const std::vector<Predictor>& alternatives, const Measurement& m,
                                   const EvaluationOptions& options) {
-  Result<std::unique_ptr<FitTest>> test = makeFitTest(m, *predictor.model, options.test);
+  Result<std::unique_ptr<FitTest>> test = makeFitTest(borrowed(m), *predictor.model, options.test);
   if (!test) return test.error();
   predictor.apply(**test);
   const bool with_derivatives = predictor.covariance.size() > 0;

@@ -158,7 +158,11 @@ Result<FitResult> fitWithTests(const std::vector<Measurement>& measurements,
 
 Result<FitResult> fitMaterial(const std::vector<Measurement>& measurements,
                               const FitOptions& options) {
-  return fitWithTests(measurements, options, makeFitTest);
+  return fitWithTests(
+      measurements, options,
+      [](const Measurement& m, const ClothModel& model, const FitTestOptions& test) {
+        return makeFitTest(borrowed(m), model, test);
+      });
 }
 
 }  // namespace tenter

@@ -13,6 +13,11 @@ namespace tenter {
 using TestFactory = std::function<Result<std::unique_ptr<FitTest>>(
     const Measurement&, const ClothModel&, const FitTestOptions&)>;
 
+/// A measurement that outlives the test, without a copy: tracked vertices fill a hundred megabytes.
+inline std::shared_ptr<const Measurement> borrowed(const Measurement& measurement) {
+  return {std::shared_ptr<const void>(), &measurement};
+}
+
 /// fitMaterial with tests of another making: what the unit tests run on analytic fakes.
 Result<FitResult> fitWithTests(const std::vector<Measurement>& measurements,
                                const FitOptions& options, const TestFactory& factory);

@@ -60,9 +60,9 @@ void FitTest::setLaws(const ClothLaws& /*laws*/) {
 
 MultistabilityReport FitTest::crossCheck(int /*frame*/) { return {}; }
 
-SimulatedTest::SimulatedTest(const Measurement& measurement, const ClothModel& model,
-                             const FitTestOptions& options)
-    : measurement_(measurement),
+SimulatedTest::SimulatedTest(std::shared_ptr<const Measurement> measurement,
+                             const ClothModel& model, const FitTestOptions& options)
+    : measurement_(std::move(measurement)),
       model_(&model),
       options_(options),
       membrane_law_(std::make_shared<SwitchableLaw>(noLaw())),
@@ -88,12 +88,12 @@ void SimulatedTest::addFrame(int replica, int source) {
 
 Result<void> SimulatedTest::tryReplica() {
   const Result<SimulationPool::Lease> lease = replicas_.front()->pool->lease();
-  if (!lease.ok()) return lease.error().in(measurement_.name);
+  if (!lease.ok()) return lease.error().in(measurement_->name);
   return {};
 }
 
 std::vector<int> SimulatedTest::chosenFrames() const {
-  const int all = static_cast<int>(measurement_.frames.size());
+  const int all = static_cast<int>(measurement_->frames.size());
   const int count = options_.max_frames > 0 ? std::min(options_.max_frames, all) : all;
   std::vector<int> chosen(count);
   for (int i = 0; i < count; ++i)

@@ -33,7 +33,7 @@ struct SolvedFrame {
 /// what is compared.
 class SimulatedTest : public FitTest {
  public:
-  const Measurement& measurement() const final { return measurement_; }
+  const Measurement& measurement() const final { return *measurement_; }
   int frameCount() const final { return static_cast<int>(frames_.size()); }
   void setParameters(const ParameterSet& parameters) final;
   void setLaws(const ClothLaws& laws) final;
@@ -51,7 +51,7 @@ class SimulatedTest : public FitTest {
   Result<void> tryReplica();
 
  protected:
-  SimulatedTest(const Measurement& measurement, const ClothModel& model,
+  SimulatedTest(std::shared_ptr<const Measurement> measurement, const ClothModel& model,
                 const FitTestOptions& options);
 
   int addReplica(SheetMesh sheet, SystemSetup setup);
@@ -72,7 +72,7 @@ class SimulatedTest : public FitTest {
   virtual void fill(const SolvedFrame& solved, FramePrediction& prediction) const = 0;
 
   const MeasurementFrame& measured(int frame) const {
-    return measurement_.frames[frames_[frame].source];
+    return measurement_->frames[frames_[frame].source];
   }
   const Replica& replicaOf(int frame) const { return *replicas_[frames_[frame].replica]; }
   const Replica& replicaAt(int replica) const { return *replicas_[replica]; }
@@ -128,7 +128,7 @@ class SimulatedTest : public FitTest {
   Eigen::MatrixXd solve(Simulation& simulation, int frame, bool with_derivatives,
                         FrameOutcome& outcome);
 
-  Measurement measurement_;
+  std::shared_ptr<const Measurement> measurement_;
   const ClothModel* model_;
   FitTestOptions options_;
   std::shared_ptr<SwitchableLaw> membrane_law_, bending_law_;

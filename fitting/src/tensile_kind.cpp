@@ -30,8 +30,8 @@ enum Clamp { kFixedClamp, kMovingClamp };
 
 class TensileTest final : public SimulatedTest {
  public:
-  TensileTest(const Measurement& m, const ClothModel& model, const FitTestOptions& options,
-              StripSheet strip);
+  TensileTest(std::shared_ptr<const Measurement> m, const ClothModel& model,
+              const FitTestOptions& options, StripSheet strip);
 
   int residualCount(int /*frame*/) const override { return 1; }
   std::vector<int> observedComponents(const ClothModel& model) const override;
@@ -61,23 +61,23 @@ class TensileTest final : public SimulatedTest {
   double default_sigma_N_;
 };
 
-TensileTest::TensileTest(const Measurement& m, const ClothModel& model,
+TensileTest::TensileTest(std::shared_ptr<const Measurement> shared, const ClothModel& model,
                          const FitTestOptions& options, StripSheet strip)
-    : SimulatedTest(m, model, options),
+    : SimulatedTest(std::move(shared), model, options),
       s_(strip.s),
       along_(strip.along),
       across_(strip.across),
       rest_length_m_(strip.s.maxCoeff() - strip.s.minCoeff()) {
   double largest_N = 0.0;
-  for (const MeasurementFrame& frame : m.frames)
+  for (const MeasurementFrame& frame : measurement().frames)
     largest_N = std::max(largest_N, std::abs(frame.force_N));
   // A file of zeros still needs a scale; its fit is meaningless but must not divide by zero.
   largest_N = std::max(largest_N, 1e-6);
   default_sigma_N_ = options.tensile_sigma_rel * largest_N;
-  forceTolerance_N = kRelativeForceTolerance * largest_N / m.tensile->strips;
+  forceTolerance_N = kRelativeForceTolerance * largest_N / measurement().tensile->strips;
 
   SystemSetup setup;
-  setup.areal_density_kg_per_m2 = m.areal_density_kg_per_m2;
+  setup.areal_density_kg_per_m2 = measurement().areal_density_kg_per_m2;
   setup.gravity_m_per_s2 = Vec3::Zero();
   setup.planar = true;
   setup.clips.resize(2);
@@ -165,8 +165,10 @@ void TensileTest::fill(const SolvedFrame& solved, FramePrediction& prediction) c
 
 }  // namespace
 
-Result<std::unique_ptr<FitTest>> makeTensileTest(const Measurement& m, const ClothModel& model,
+Result<std::unique_ptr<FitTest>> makeTensileTest(std::shared_ptr<const Measurement> measurement,
+                                                 const ClothModel& model,
                                                  const FitTestOptions& options) {
+  const Measurement& m = *measurement;
   const TensileSetup& setup = *m.tensile;
   const double rest_length_m = setup.length_m - setup.zero_offset_m;
   if (!(rest_length_m > 0.0) || !(setup.width_m > 0.0) || setup.strips < 1)
@@ -181,7 +183,8 @@ Result<std::unique_ptr<FitTest>> makeTensileTest(const Measurement& m, const Clo
                 equalLines(-0.5 * setup.width_m, 0.5 * setup.width_m, across - 1), setup.angle_rad,
                 DiagonalPattern::kAlternating);
   if (!strip) return strip.error().in(m.name);
-  auto test = std::make_unique<TensileTest>(m, model, options, std::move(*strip));
+  auto test =
+      std::make_unique<TensileTest>(std::move(measurement), model, options, std::move(*strip));
   if (const Result<void> tried = test->tryReplica(); !tried.ok()) return tried.error();
   return std::unique_ptr<FitTest>(std::move(test));
 }

@@ -8,13 +8,13 @@
 namespace tenter {
 
 /// The kinds of tests, one file each; fit_test_registry.cpp lists them.
-Result<std::unique_ptr<FitTest>> makeTensileTest(const Measurement& measurement,
+Result<std::unique_ptr<FitTest>> makeTensileTest(std::shared_ptr<const Measurement> measurement,
                                                  const ClothModel& model,
                                                  const FitTestOptions& options);
-Result<std::unique_ptr<FitTest>> makeCantileverTest(const Measurement& measurement,
+Result<std::unique_ptr<FitTest>> makeCantileverTest(std::shared_ptr<const Measurement> measurement,
                                                     const ClothModel& model,
                                                     const FitTestOptions& options);
-Result<std::unique_ptr<FitTest>> makeClothTest(const Measurement& measurement,
+Result<std::unique_ptr<FitTest>> makeClothTest(std::shared_ptr<const Measurement> measurement,
                                                const ClothModel& model,
                                                const FitTestOptions& options);
 

@@ -143,6 +143,10 @@ class FitTest {
 /// Builds the test that a measurement's kind calls for. To add a kind: one file, and one line in
 /// fit_test_registry.cpp. Error when the measurement lacks what its kind needs or the model cannot
 /// run on it.
+Result<std::unique_ptr<FitTest>> makeFitTest(std::shared_ptr<const Measurement> measurement,
+                                             const ClothModel& model,
+                                             const FitTestOptions& options);
+/// The same on a copy of the measurement.
 Result<std::unique_ptr<FitTest>> makeFitTest(const Measurement& measurement,
                                              const ClothModel& model,
                                              const FitTestOptions& options);
