@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
+
 #include "page_layout.h"
 #include "tenter/calib/marker_cells.h"
 
@@ -38,7 +39,8 @@ Result<PrintPage> boardPage(const Board& board, const Paper& paper) {
         page.boxes.push_back({x, y, square, square, 0});
       } else if (board.kind == Board::Kind::kCharuco) {
         const double margin = 0.5 * (square - marker);
-        addMarker(page, *markerCells(board.dictionary, marker_id++), x + margin, y + margin, marker);
+        addMarker(page, *markerCells(board.dictionary, marker_id++), x + margin, y + margin,
+                  marker);
       }
     }
   }

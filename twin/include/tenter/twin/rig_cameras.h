@@ -24,7 +24,7 @@ struct RigCameraOptions {
   std::string protocol = "stretch-weft";  ///< The table tests are looked at from where it hangs.
   int count = 4;                          ///< 2 to 8.
   int width_px = 1936;                    ///< 320 to 4096; 1.6 times the height.
-  std::uint64_t seed = 1;  ///< Of how lenses and places differ from the drawing.
+  std::uint64_t seed = 1;                 ///< Of how lenses and places differ from the drawing.
 };
 
 /// Cameras around and above the sample: 25 mm lenses at f/16 on sensors of 11.3 mm, half a metre

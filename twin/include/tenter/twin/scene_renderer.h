@@ -23,8 +23,8 @@ struct RenderOptions {
   int facets = 297;        ///< Quads a side of the rendered sheet.
 };
 
-/// Pictures of the virtual rig: cloth printed with wavelet noise, clips with tags, cords, the table,
-/// as the cameras see them through lenses with distortion and a finite depth of field
+/// Pictures of the virtual rig: cloth printed with wavelet noise, clips with tags, cords, the
+/// table, as the cameras see them through lenses with distortion and a finite depth of field
 /// (docs/twin.md). Equal arguments give equal images, whatever the number of threads.
 class SceneRenderer {
  public:
