@@ -15,6 +15,7 @@ find_package(Ceres 2.1 REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(EXPAT 2.5 REQUIRED)
 find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc imgcodecs calib3d video objdetect aruco)
+find_package(embree 3.13 REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOPLY IOXML)
 
 # tenter_cholmod: SuiteSparse 5.12 of Debian comes without a CMake package.

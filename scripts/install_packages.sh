@@ -11,7 +11,7 @@ packages=(
   libeigen3-dev libceres-dev libsuitesparse-dev libopenblas-pthread-dev libopenblas0-pthread libtbb-dev
   nlohmann-json3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev libssl-dev libvtk9-dev zlib1g-dev libhdf5-dev
   libopencv-dev
-  libopencv-contrib-dev libexpat1-dev
+  libopencv-contrib-dev libexpat1-dev libembree-dev
   # libraries that talk to devices
   libusb-1.0-0-dev libumockdev-dev umockdev libmodbus-dev libsystemd-dev
   # tests and benchmarks

@@ -7,6 +7,7 @@
 #include "progress.h"
 #include "tenter/core/measurement_folder.h"
 #include "tenter/twin/capture.h"
+#include "twin_images.h"
 #ifdef TENTER_HARDWARE
 #include "twin_session.h"
 #endif
@@ -38,25 +39,29 @@ struct CaptureCommand {
   bool measurement = false, session = false, through_daemon = false;
   std::string modbus = "tcp";
   int nodes = 0;
-  std::string output, truth;
+  std::string fabric, output, truth;
+  ImageOptions images;
 };
 
 void declareCapture(CLI::App& command, CaptureCommand& o) {
   const CLI::IsMember on_off({"on", "off"});
-  command.add_option("--fabric", o.capture.fabric, "One of `tenter twin fabrics`")->required();
+  command.add_option("--fabric", o.fabric, "One of `tenter twin fabrics`; boards need none");
   command.add_option("--protocol", o.capture.protocol, "One of `tenter protocol list`")->required();
   CLI::Option_group* kind = command.add_option_group("what is written");
   kind->require_option(1);
   kind->add_flag("--measurement", o.measurement, "A measurement, the input of a fit");
+  kind->add_flag("--session", o.session, "A session with images, as a rig records it");
+  kind->add_option("--boards", o.images.boards,
+                   "Images of a calibration board in so many poses; number 0 lies level in the rig")
+      ->check(CLI::Range(3, 1000));
 #ifdef TENTER_HARDWARE
-  kind->add_flag("--session", o.session, "A session, as the daemon records it");
   command.add_flag("--through-daemon", o.through_daemon,
-                   "Through virtual devices and tenterd, in real time; sessions have no other way");
+                   "A session through virtual devices and tenterd, in real time, without images");
   command.add_option("--modbus", o.modbus, "How a session's load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
 #endif
-  command.add_option("-o,--output", o.output, "Folder of the measurement or session")->required();
+  command.add_option("-o,--output", o.output, "Folder of what is written")->required();
   command.add_option("--truth", o.truth, "Folder for what a fit must not know");
   command.add_option("--seed", o.capture.seed, "Of noise and of the specimen")
       ->capture_default_str();
@@ -64,7 +69,7 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
       ->capture_default_str();
   command
       .add_option("--nodes", o.nodes,
-                  "Nodes a side of the simulated sheet; 0: 50 for a measurement, 25 for a session")
+                  "Nodes a side of the simulated sheet; 0: 50, and 25 through the daemon")
       ->capture_default_str();
   command.add_option("--frames", o.capture.frames, "Frames")->capture_default_str();
   command.add_option("--tracked", o.capture.tracked, "Tracked vertices a side")
@@ -81,15 +86,13 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
   command.add_option("--diagonals", o.diagonals, "Diagonals of the simulated sheet")
       ->check(CLI::IsMember({"uniform", "alternating"}))
       ->capture_default_str();
+  declareImages(command, o.images);
 }
 
 #ifdef TENTER_HARDWARE
 Result<int> captureThroughDaemon(const CaptureCommand& command, Console& console) {
-  if (!command.through_daemon) {
-    return usageError("a session is recorded by the daemon: add --through-daemon");
-  }
   SessionCapture session;
-  session.mount = {command.capture.fabric, command.capture.protocol, command.capture.seed,
+  session.mount = {command.fabric, command.capture.protocol, command.capture.seed,
                    command.capture.specimen, MountOptions{}.nodes};
   if (command.nodes != 0) session.mount.nodes = command.nodes;
   session.tcp = command.modbus == "tcp";
@@ -99,11 +102,8 @@ Result<int> captureThroughDaemon(const CaptureCommand& command, Console& console
 }
 #endif
 
-Result<int> capture(const CaptureCommand& command, Console& console) {
-#ifdef TENTER_HARDWARE
-  if (command.session) return captureThroughDaemon(command, console);
-#endif
-  if (command.through_daemon) return usageError("--through-daemon makes a --session");
+Result<int> captureToMeasurement(const CaptureOptions& capture, const CaptureCommand& command,
+                                 Console& console) {
   if (auto free = checkOutputFolder(command.output, measurementFolder()); !free)
     return free.error();
   if (!command.truth.empty()) {
@@ -112,14 +112,7 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
     }
     if (auto free = checkOutputFolder(command.truth, truthFolder()); !free) return free.error();
   }
-  CaptureOptions options = command.capture;
-  if (command.nodes != 0) options.nodes = command.nodes;
-  options.noise = command.noise == "on";
-  options.scatter = command.scatter == "on";
-  options.friction = options.cord_friction = command.friction == "on";
-  options.diagonals =
-      command.diagonals == "uniform" ? DiagonalPattern::kUniform : DiagonalPattern::kAlternating;
-  options.cancelled = interrupted;
+  CaptureOptions options = capture;
   Progress progress(console);
   options.progress = [&](int done, int all) {
     progress.show(
@@ -147,6 +140,34 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
   console.say(command.output + ": " + counted(captured->measurement.frames.size(), "frame") +
               " of " + options.protocol);
   return kDone;
+}
+
+Result<int> capture(const CaptureCommand& command, Console& console) {
+  if (command.fabric.empty() && command.images.boards == 0) {
+    return usageError("--fabric is required", "see `tenter twin fabrics`");
+  }
+  if (command.through_daemon) {
+    if (!command.session) return usageError("--through-daemon makes a --session");
+#ifdef TENTER_HARDWARE
+    return captureThroughDaemon(command, console);
+#endif
+  }
+  CaptureOptions options = command.capture;
+  options.fabric = command.fabric;
+  if (command.nodes != 0) options.nodes = command.nodes;
+  options.noise = command.noise == "on";
+  options.scatter = command.scatter == "on";
+  options.friction = options.cord_friction = command.friction == "on";
+  options.diagonals =
+      command.diagonals == "uniform" ? DiagonalPattern::kUniform : DiagonalPattern::kAlternating;
+  options.cancelled = interrupted;
+  if (command.images.boards > 0) {
+    return captureBoards(options, command.images, command.output, command.truth, console);
+  }
+  if (command.session) {
+    return captureImages(options, command.images, command.output, command.truth, console);
+  }
+  return captureToMeasurement(options, command, console);
 }
 
 }  // namespace

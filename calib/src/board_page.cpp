@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
-#include <opencv2/aruco.hpp>
 
 #include "page_layout.h"
+#include "tenter/calib/marker_cells.h"
 
 namespace tenter {
 
@@ -10,24 +10,12 @@ namespace {
 
 constexpr double kMmPerMetre = 1e3;
 
-/// A marker in cells, black border included: drawn at one pixel a cell.
-cv::Mat cellsOf(const std::string& dictionary_name, int id) {
-  for (const MarkerDictionary& row : markerDictionaries()) {
-    if (row.name != dictionary_name) continue;
-    const auto dictionary = cv::aruco::getPredefinedDictionary(row.opencv_id);
-    cv::Mat cells;
-    cv::aruco::drawMarker(dictionary, id, dictionary->markerSize + 2, cells, 1);
-    return cells;
-  }
-  return {};
-}
-
-void addMarker(PrintPage& page, const cv::Mat& cells, double x_mm, double y_mm, double side_mm) {
+void addMarker(PrintPage& page, const ByteImage& cells, double x_mm, double y_mm, double side_mm) {
   page.boxes.push_back({x_mm, y_mm, side_mm, side_mm, 0});
-  const double cell = side_mm / cells.cols;
-  for (int row = 0; row < cells.rows; ++row) {
-    for (int column = 0; column < cells.cols; ++column) {
-      if (cells.at<unsigned char>(row, column) < 128) continue;
+  const double cell = side_mm / cells.width;
+  for (int row = 0; row < cells.height; ++row) {
+    for (int column = 0; column < cells.width; ++column) {
+      if (cells.at(column, row) == 0) continue;
       page.boxes.push_back({x_mm + column * cell, y_mm + row * cell, cell, cell, 255});
     }
   }
@@ -51,7 +39,8 @@ Result<PrintPage> boardPage(const Board& board, const Paper& paper) {
         page.boxes.push_back({x, y, square, square, 0});
       } else if (board.kind == Board::Kind::kCharuco) {
         const double margin = 0.5 * (square - marker);
-        addMarker(page, cellsOf(board.dictionary, marker_id++), x + margin, y + margin, marker);
+        addMarker(page, *markerCells(board.dictionary, marker_id++), x + margin, y + margin,
+                  marker);
       }
     }
   }

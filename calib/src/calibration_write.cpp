@@ -130,12 +130,16 @@ double baseline_m(const CalibratedCamera& a, const CalibratedCamera& b) {
       .norm();
 }
 
-Result<void> writeCalibration(const std::filesystem::path& file, const CameraCalibration& c) {
+std::string calibrationText(const CameraCalibration& c) {
   std::set<std::string> names;
   for (const CalibratedCamera& camera : c.cameras) names.insert(camera.name);
   require(!names.empty() && names.size() == c.cameras.size(), "cameras have names of their own");
   const auto replace = nlohmann::ordered_json::error_handler_t::replace;
-  return writeFileAtomically(file, calibration_json::encode(c).dump(1, ' ', false, replace) + "\n");
+  return calibration_json::encode(c).dump(1, ' ', false, replace) + "\n";
+}
+
+Result<void> writeCalibration(const std::filesystem::path& file, const CameraCalibration& c) {
+  return writeFileAtomically(file, calibrationText(c));
 }
 
 }  // namespace tenter

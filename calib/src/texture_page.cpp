@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "page_layout.h"
-#include "wavelet_noise.h"
+#include "tenter/calib/wavelet_noise.h"
 
 namespace tenter {
 

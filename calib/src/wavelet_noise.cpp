@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "wavelet_noise.h"
+#include "tenter/calib/wavelet_noise.h"
 
 #include <array>
 #include <cmath>

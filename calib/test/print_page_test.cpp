@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "wavelet_noise.h"
+#include "tenter/calib/wavelet_noise.h"
 
 namespace tenter {
 namespace {

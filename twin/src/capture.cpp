@@ -81,6 +81,9 @@ Result<CaptureResult> captureMeasurement(const CaptureOptions& options) {
       addNoise(options, i, run->frames[i].cord_motion, out.measurement.frames[i]);
     }
   }
+  if (options.keep_moments) {
+    for (ExactFrame& frame : run->frames) out.moments.push_back(std::move(frame.moment));
+  }
   out.statistics = run->statistics;
   out.statistics.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -88,7 +91,7 @@ Result<CaptureResult> captureMeasurement(const CaptureOptions& options) {
 }
 
 const FolderKind& truthFolder() {
-  static const FolderKind kKind{"truth.json", "\"protocol\"", {"exact"}};
+  static const FolderKind kKind{"truth.json", "\"protocol\"", {"exact", "cameras.json"}};
   return kKind;
 }
 
@@ -96,6 +99,10 @@ Result<void> writeTruth(const std::filesystem::path& folder, const CaptureTruth&
   return writeFolderAtomically(
       folder, truthFolder(), [&](const std::filesystem::path& inside) -> Result<void> {
         if (auto done = writeMeasurement(inside / "exact", truth.exact); !done) return done;
+        if (truth.cameras) {
+          auto done = writeCalibration(inside / "cameras.json", *truth.cameras);
+          if (!done) return done;
+        }
         return writeFileAtomically(inside / "truth.json", truth.specimen.dump(2) + "\n");
       });
 }

@@ -5,6 +5,7 @@
 
 #include "hung_sample.h"
 #include "sheet_sampler.h"
+#include "tenter/twin/mounted_specimen.h"
 
 namespace tenter {
 namespace {
@@ -163,7 +164,21 @@ class CordRun {
         lengths_[cord_number] = length;
       }
     }
+    if (options_.keep_moments) frame.moment = moment();
     run_.frames.push_back(std::move(frame));
+  }
+
+  RigMoment moment() const {
+    const ClothState& state = sample_.state();
+    RigMoment out{{sample_.lines(), sample_.stops(0), sample_.stops(1),
+                   state.positions(sample_.system().sheet().nodeCount()), state.clips},
+                  std::vector<double>(MountedSpecimen::kAxes, 0.0)};
+    std::size_t axis = 0;
+    for (const CordPlace& place : actuatorOrder(rig_)) {
+      const RigCord& cord = rig_.clips[place.clip].cords[place.cord];
+      out.positions_m.at(axis++) = cord.slack_m + (cord.channel < 0 ? 0.0 : travel_[cord.channel]);
+    }
+    return out;
   }
 
   static constexpr double kLongestStep_m = 0.01;

@@ -56,22 +56,14 @@ struct MountedSpecimen::Impl {
   }
 };
 
-/// Cords that a test works come first, then those that only hold, each in the order of the clips.
 void MountedSpecimen::Impl::assignActuators() {
-  line_of.fill(-1);
-  for (const int channel : {0, 1, -1}) {
-    for (std::size_t c = 0; c < sample->rig().clips.size(); ++c) {
-      const RigClip& clip = sample->rig().clips[c];
-      for (std::size_t k = 0; k < clip.cords.size(); ++k) {
-        const RigCord& cord = clip.cords[k];
-        if (cord.channel != channel) continue;
-        const int axis = static_cast<int>(lines.size());
-        require(axis < kAxes, "MountedSpecimen: more cords than actuators");
-        line_of[static_cast<std::size_t>(axis)] = axis;
-        lines.push_back({axis, static_cast<int>(c), static_cast<int>(k), cord.id,
-                         cord.cord.rest_length_m + cord.slack_m, cord.cord.stiffness_N});
-      }
-    }
+  for (const CordPlace& place : actuatorOrder(sample->rig())) {
+    const RigCord& cord = sample->rig().clips[place.clip].cords[place.cord];
+    const int axis = static_cast<int>(lines.size());
+    require(axis < kAxes, "MountedSpecimen: more cords than actuators");
+    line_of[static_cast<std::size_t>(axis)] = axis;
+    lines.push_back({axis, place.clip, place.cord, cord.id, cord.cord.rest_length_m + cord.slack_m,
+                     cord.cord.stiffness_N});
   }
 }
 

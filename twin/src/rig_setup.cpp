@@ -154,6 +154,22 @@ RigSetup cornerRig(const Fabric& fabric, int frames) {
 
 }  // namespace
 
+std::vector<CordPlace> actuatorOrder(const RigSetup& rig) {
+  std::vector<CordPlace> order;
+  for (const int channel : {0, 1, -1}) {
+    for (std::size_t c = 0; c < rig.clips.size(); ++c) {
+      for (std::size_t k = 0; k < rig.clips[c].cords.size(); ++k) {
+        if (rig.clips[c].cords[k].channel != channel) continue;
+        order.push_back({static_cast<int>(c), static_cast<int>(k)});
+      }
+    }
+  }
+  return order;
+}
+
+std::string axisName(int axis) { return "axis-" + std::to_string(axis + 1); }
+std::string cellName(int axis) { return "cell-" + std::to_string(axis + 1); }
+
 RigSetup makeRig(std::string_view protocol, const Fabric& fabric, int frames) {
   using Maker = std::function<RigSetup(const Fabric&, int)>;
   static const std::map<std::string_view, Maker> kMakers{

@@ -41,6 +41,19 @@ struct RigSetup {
   std::vector<RigStep> steps;
 };
 
+/// A cord by its places in RigSetup::clips and RigClip::cords.
+struct CordPlace {
+  int clip, cord;
+};
+
+/// Cords in the order of the actuators that have them: first those that the protocol works, then
+/// those that only hold, each in the order of the clips.
+std::vector<CordPlace> actuatorOrder(const RigSetup& rig);
+
+/// Names of the rig's channels, in the order of a session's lists: "axis-1", "cell-1".
+std::string axisName(int axis);
+std::string cellName(int axis);
+
 /// Clips, cords and script of a protocol with cords. The sample lies over [0, kSampleSide_m]^2 in
 /// the plane z = 0.
 RigSetup makeRig(std::string_view protocol, const Fabric& fabric, int frames);

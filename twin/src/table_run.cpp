@@ -5,6 +5,7 @@
 
 #include "rig_setup.h"
 #include "sheet_sampler.h"
+#include "tenter/twin/mounted_specimen.h"
 #include "virtual_cloth.h"
 
 namespace tenter {
@@ -182,6 +183,11 @@ class TableRun {
       out.reading.positions.col(v) = pose * Vec3(run_.rest.positions.col(v));
     }
     out.reading.clips.push_back(std::move(table));
+    if (options_.keep_moments) {
+      out.moment = {{lines, axis_ == 0 ? here : none, axis_ == 0 ? none : here, positions, {pose}},
+                    std::vector<double>(MountedSpecimen::kAxes, 0.0)};
+      out.moment.positions_m.front() = pose.translation()[axis_];
+    }
     run_.frames.push_back(std::move(out));
   }
 

@@ -33,6 +33,7 @@ Vec2 materialPoint(Vec2 place, bool on_bias);  ///< (u, v) of a place on the fla
 struct ExactFrame {
   MeasurementFrame reading;
   std::vector<double> cord_motion;  ///< +1 drawn in, -1 let out, 0 still; one a cord.
+  RigMoment moment;                 ///< Empty unless the options keep it.
 };
 
 struct CaptureRun {

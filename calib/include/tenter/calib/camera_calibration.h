@@ -88,7 +88,10 @@ struct CameraCalibration {
 /// Distance of two cameras' centres of projection [m].
 double baseline_m(const CalibratedCamera& a, const CalibratedCamera& b);
 
-/// Complete or absent. Precondition: at least one camera, names distinct.
+/// The text of a calibration file. Precondition: at least one camera, names distinct.
+std::string calibrationText(const CameraCalibration& c);
+
+/// Writes it, complete or absent.
 Result<void> writeCalibration(const std::filesystem::path& file, const CameraCalibration& c);
 
 /// Reads and checks. A calibration whose verdict is "rejected" is an error of kind

@@ -9,11 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "tenter/calib/camera_calibration.h"
 #include "tenter/core/measurement.h"
 #include "tenter/mechanics/cloth_models.h"
 #include "tenter/mechanics/sheet_mesh.h"
 #include "tenter/twin/fabrics.h"
 #include "tenter/twin/protocol.h"
+#include "tenter/twin/sheet_shape.h"
 
 namespace tenter {
 
@@ -40,15 +42,23 @@ struct CaptureOptions {
   bool noise = true;                       ///< Of positions, poses, tensions and directions.
   bool cord_friction = true;               ///< Only with noise.
   bool friction = true;                    ///< Internal friction of the cloth; never with own_law.
+  bool keep_moments = false;               ///< For a renderer.
   std::optional<OwnLaw> own_law;           ///< With nodes = 25 the sheet is that of a fit.
   std::function<void(int, int)> progress;  ///< Frames done, frames in all.
   std::function<bool()> cancelled;         ///< Polled between Newton steps.
+};
+
+/// One frame as the rig was in it.
+struct RigMoment {
+  SheetShape shape;
+  std::vector<double> positions_m;  ///< Of the actuators (MountedSpecimen), from home.
 };
 
 /// What nothing but tests and `evaluate --truth` may open.
 struct CaptureTruth {
   Measurement exact;        ///< Without noise or friction of cords; same frames, same sigmas.
   nlohmann::json specimen;  ///< Constants, seed, options.
+  std::optional<CameraCalibration> cameras = {};  ///< As they truly are, where there were any.
 };
 
 struct CaptureStatistics {
@@ -61,6 +71,7 @@ struct CaptureResult {
   Measurement measurement;
   CaptureTruth truth;
   CaptureStatistics statistics;
+  std::vector<RigMoment> moments;  ///< One a frame, if they were to be kept.
 };
 
 /// Simulates a protocol on the virtual rig and returns what cameras and load cells would have seen.
@@ -71,7 +82,8 @@ Result<CaptureResult> captureMeasurement(const CaptureOptions& options);
 /// What tells a truth's folder from others.
 const FolderKind& truthFolder();
 
-/// truth.json and exact/ (a measurement folder). Complete or absent; replaces an older one.
+/// truth.json, exact/ (a measurement folder) and, if there were cameras, cameras.json. Complete or
+/// absent; replaces an older one.
 Result<void> writeTruth(const std::filesystem::path& folder, const CaptureTruth& truth);
 
 /// A strip of the same cloth between the clamps of a tensile machine.
