@@ -75,6 +75,11 @@ Result<void> ServedRig::serve() {
     if (!server) return server.error();
     servers_.push_back(*std::move(server));
   }
+  if (options_.cameras) {
+    auto cameras = VirtualCameras::serve(*options_.cameras);
+    if (!cameras) return cameras.error();
+    cameras_ = *std::move(cameras);
+  }
   std::vector<VirtualActuatorSpec> devices;
   for (int i = 0; i < kAxes; ++i) {
     VirtualActuatorSpec device;
@@ -134,6 +139,7 @@ std::string ServedRig::configuration() const {
          << "\ntravel_m = [0.0, 0.08]\nmax_speed_m_per_s = 0.004\n"
          << "max_acceleration_m_per_s2 = 0.1\ncell = \"cell-" << number(i) << "\"\n";
   }
+  if (cameras_) toml << cameras_->configuration();
   return toml.str();
 }
 

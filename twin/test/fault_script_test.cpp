@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tenter/rig/toml_document.h"
+#include "tenter/core/toml_document.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
 #include "tenter/twin/fault_schedule.h"
@@ -24,13 +24,13 @@ std::string script(const std::string& keys) {
 }
 
 FaultScript parsed(const std::string& keys, bool tcp = true) {
-  auto result = parseFaultScript(script(keys), "s.toml", kAxes, tcp);
+  auto result = parseFaultScript(script(keys), "s.toml", {kAxes, tcp});
   EXPECT_TRUE(result.ok()) << result.error().message();
   return *std::move(result);
 }
 
 std::string refusal(const std::string& toml, bool tcp = true) {
-  const auto result = parseFaultScript(toml, "s.toml", kAxes, tcp);
+  const auto result = parseFaultScript(toml, "s.toml", {kAxes, tcp});
   if (result) return "";
   EXPECT_EQ(result.error().kind, ErrorKind::kBadInput);
   return result.error().message();
@@ -194,7 +194,7 @@ TEST(FaultSchedule, RandomDelaysComeFromTheSeed) {
   one.run(2.0);
   other.run(2.0);
   EXPECT_EQ(one.times_s, other.times_s);
-  auto another = parseFaultScript("seed = 9\n" + script(keys), "s.toml", kAxes, true);
+  auto another = parseFaultScript("seed = 9\n" + script(keys), "s.toml", {kAxes, true});
   FaultSchedule schedule(*std::move(another));
   double begun_s = -1.0;
   for (double t = 0.0; t < 2.0; t += Play::kStep_s) {

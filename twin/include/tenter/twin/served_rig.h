@@ -5,11 +5,13 @@
 #include <atomic>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tenter/core/result.h"
 #include "tenter/twin/mounted_specimen.h"
+#include "tenter/twin/virtual_cameras.h"
 #include "tenter/twin/virtual_modbus.h"
 #include "tenter/twin/virtual_usb.h"
 
@@ -19,6 +21,7 @@ struct ServedRigOptions {
   MountOptions mount;           ///< What hangs in it; the seed is also that of the cells' noise.
   std::filesystem::path state;  ///< Folder for rig.toml, the truth and, with RTU, the bus.
   bool tcp = true;
+  std::optional<VirtualCamerasOptions> cameras;  ///< Nothing: it has none.
 };
 
 class LiveSpecimen;
@@ -38,6 +41,7 @@ class ServedRig {
   ServedRig& operator=(const ServedRig&) = delete;
 
   VirtualUsb& usb() { return *usb_; }
+  VirtualCameras* cameras() { return cameras_.get(); }  ///< Null without any.
   VirtualCell& cell(int index) { return *cells_.at(static_cast<std::size_t>(index)); }
   std::filesystem::path configFile() const { return options_.state / "rig.toml"; }
   /// What the cord truly pulls at the clip or hook.
@@ -61,6 +65,7 @@ class ServedRig {
   std::vector<std::shared_ptr<VirtualCell>> cells_;
   std::vector<std::unique_ptr<VirtualModbus>> servers_;
   std::unique_ptr<VirtualUsb> usb_;
+  std::unique_ptr<VirtualCameras> cameras_;
 };
 
 }  // namespace tenter
