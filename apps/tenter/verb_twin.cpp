@@ -175,7 +175,7 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
 Verb twinVerb() {
   static const std::array kRows = {
 #ifdef TENTER_HARDWARE
-      twinServe(), twinTruth(),
+      twinServe(), twinCameras(), twinTruth(),
 #endif
       Verb{"fabrics", "Names of the virtual fabrics",
            [](CLI::App& c, Action& a) {
