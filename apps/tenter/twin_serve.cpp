@@ -25,7 +25,7 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--modbus", o.modbus, "How the load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
-  declareCameraSource(command, o.cameras, 0);
+  declareRigCameras(command, o.cameras);
   command.add_option("--fault", o.faults, "Script of faults (docs/formats/fault-script.md)");
   command.add_option("--protocol", o.rig.mount.protocol, "How the sample hangs")
       ->capture_default_str();
@@ -54,11 +54,7 @@ Result<int> serve(const Options& o, Console& console) {
     script = *std::move(read);
   }
   ServedRigOptions options = o.rig;
-  if (o.cameras.cameras > 0) {
-    auto cameras = camerasOf(o.cameras, o.rig.mount.seed);
-    if (!cameras) return cameras.error();
-    options.cameras = *std::move(cameras);
-  }
+  if (auto added = addCameras(o.cameras, options); !added) return added.error();
   if (auto ready = preloadDevices(); !ready) return ready.error();
   options.state = o.state;
   options.tcp = o.modbus == "tcp";

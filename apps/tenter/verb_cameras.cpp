@@ -2,6 +2,8 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <map>
 
 #include "interrupt.h"
 #include "output_guard.h"
@@ -66,7 +68,6 @@ class Tally {
       skew_sum_ns_ += static_cast<double>(*set.skew_ns);
       worst_skew_ns_ = std::max(worst_skew_ns_, *set.skew_ns);
     }
-    seconds_ += 1e-9 * static_cast<double>(set.done_ns - set.time_ns);
     for (const SetEvent& event : set.events) {
       const auto camera = static_cast<std::size_t>(event.camera);
       ++faults_[bank.section().cameras[camera].name][std::string(frameFaultName(event.fault))];
@@ -102,7 +103,7 @@ class Tally {
 
  private:
   int sets_ = 0, complete_ = 0, retakes_ = 0;
-  double skew_sum_ns_ = 0.0, seconds_ = 0.0;
+  double skew_sum_ns_ = 0.0;
   std::int64_t worst_skew_ns_ = 0;
   std::map<std::string, std::map<std::string, int>> faults_;
 };

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "capture.h"
 
+#include <sched.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 namespace tenter::daemon {
 namespace {
@@ -54,6 +56,10 @@ void CaptureService::request(std::int64_t index, const std::shared_ptr<Recorder>
 }
 
 void CaptureService::run() {
+  // Coding and storing images must not come before what halts the rig, though the daemon be
+  // real-time.
+  const sched_param ordinary{};
+  sched_setscheduler(gettid(), SCHED_OTHER, &ordinary);
   for (;;) {
     Wanted wanted;
     {

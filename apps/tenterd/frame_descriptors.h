@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "tenter/acquisition/camera_bank.h"

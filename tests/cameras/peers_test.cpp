@@ -29,7 +29,7 @@ TEST(CameraPeers, AravisToolReadsAndWritesFeatures) {
   const ServedCameras served(2, 320, 240);
   const std::string tool = "arv-tool-0.8 -a " + served.address(1) + " control ";
   EXPECT_THAT(
-      outputOf(tool + "DeviceSerialNumber Width Height"),
+      outputOf(tool + "DeviceID Width Height"),
       testing::AllOf(HasSubstr("TWIN-2"), HasSubstr("Width = 320"), HasSubstr("Height = 240")));
   EXPECT_THAT(outputOf(tool + "ExposureTimeAbs=7000"), HasSubstr("7000"));
   EXPECT_THAT(outputOf("arv-tool-0.8 -a " + served.address(0) + " features"),

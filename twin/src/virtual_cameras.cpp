@@ -10,6 +10,7 @@ namespace tenter {
 
 struct VirtualCameras::State {
   std::mutex mutex;
+  std::chrono::milliseconds set_timeout{};
   std::vector<std::unique_ptr<CameraSimulator>> cameras;
 };
 
@@ -32,6 +33,7 @@ Result<std::unique_ptr<VirtualCameras>> VirtualCameras::serve(
   CameraSimulator::seedLosses(options.seed);
   for (int network = 1; network <= kNetworks; ++network) {
     auto state = std::make_unique<State>();
+    state->set_timeout = options.set_timeout;
     for (int i = 0; i < options.count; ++i) {
       auto camera = std::make_unique<CameraSimulator>(i, addressIn(network, i), options);
       if (!camera->plugIn()) break;
@@ -66,6 +68,7 @@ std::string VirtualCameras::serial(int camera) const {
 std::string VirtualCameras::configuration() const {
   std::ostringstream toml;
   toml << "\n[cameras]\ntrigger = \"software\"\nexposure_us = " << kNominalExposure_us
+       << "\nset_timeout_ms = " << state_->set_timeout.count()
        << "\nresend = false\ncommon_clock = true\n";
   for (int i = 0; i < count(); ++i) {
     toml << "\n[[cameras.camera]]\nname = \"" << name(i) << "\"\naddress = \"" << address(i)

@@ -56,6 +56,38 @@ TEST(FaultScript, EveryKindIsReadAndInTheSchema) {
   }
 }
 
+TEST(FaultScript, EveryFaultOfACameraIsReadAndInTheSchema) {
+  for (const std::string& kind : cameraFaultNames()) {
+    std::string keys = "device = \"camera-4\"\nat_s = 1.0\nkind = \"" + kind + "\"";
+    if (kind == "lost-packets") keys += "\nlost_percent = 0.5";
+    if (kind == "defocused") keys += "\nblur_px = 2.0";
+    const auto read = parseFaultScript(script(keys), "s.toml", {kAxes, true, 4});
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_EQ(read->faults.at(0).deviceName(), "camera-4");
+    EXPECT_THAT(bySchema(script(keys)), IsEmpty()) << kind;
+    const auto& fault = std::get<CameraFault>(read->faults.at(0).kind);
+    if (kind == "swapped") EXPECT_EQ(fault.other, 0);
+    if (kind == "lost-packets") EXPECT_DOUBLE_EQ(fault.lost_share, 0.005);
+  }
+}
+
+TEST(FaultScript, WhatACameraDoesNotHaveIsRefused) {
+  const auto refusalOf = [](const std::string& keys, int cameras = 4) {
+    const auto read = parseFaultScript(script("device = \"camera-2\"\n" + keys), "s.toml",
+                                       {kAxes, true, cameras});
+    return read ? "" : read.error().message();
+  };
+  const std::string when = "at_s = 1.0\n";
+  EXPECT_THAT(refusalOf(when + "kind = \"frozen\"", 0), HasSubstr("no device"));
+  EXPECT_THAT(refusalOf(when + "kind = \"stall\""), HasSubstr("lost-packets"));
+  EXPECT_THAT(refusalOf(when + "kind = \"lost-packets\""), HasSubstr("lost_percent"));
+  EXPECT_THAT(refusalOf(when + "kind = \"swapped\"\nwith = \"camera-2\""), HasSubstr("with"));
+  EXPECT_THAT(refusalOf(when + "kind = \"swapped\"\nwith = \"camera-9\""), HasSubstr("with"));
+  EXPECT_THAT(refusalOf(when + "kind = \"frozen\"\ncount = 2"), HasSubstr("count"));
+  EXPECT_THAT(refusalOf(when + "kind = \"frozen\"\nblur_px = 2.0"), HasSubstr("defocused"));
+  EXPECT_THAT(refusalOf("force_N = 1.0\nkind = \"frozen\""), HasSubstr("force_N"));
+}
+
 TEST(FaultScript, WhatIsWrongIsNamed) {
   const std::string good = "device = \"axis-1\"\nkind = \"stall\"\n";
   struct Case {

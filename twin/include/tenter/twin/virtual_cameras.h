@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ struct VirtualCamerasOptions {
   int count = 4;
   int width_px = 1936, height_px = 1210;
   std::uint64_t seed = 1;  ///< Of which packets are lost.
+  /// How long a set of images may take; a source that has to render them takes its time.
+  std::chrono::milliseconds set_timeout{2000};
   std::shared_ptr<ImageSource> source;
 };
 
