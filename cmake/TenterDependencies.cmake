@@ -34,6 +34,7 @@ if(TENTER_HARDWARE)
   pkg_check_modules(umockdev REQUIRED IMPORTED_TARGET GLOBAL umockdev-1.0>=0.17 gobject-2.0)
   pkg_check_modules(libsystemd REQUIRED IMPORTED_TARGET GLOBAL libsystemd)
   pkg_check_modules(libmodbus REQUIRED IMPORTED_TARGET GLOBAL libmodbus>=3.1.6)
+  pkg_check_modules(aravis REQUIRED IMPORTED_TARGET GLOBAL aravis-0.8>=0.8.26)
 endif()
 
 # tests only

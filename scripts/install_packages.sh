@@ -13,10 +13,10 @@ packages=(
   libopencv-dev
   libopencv-contrib-dev libexpat1-dev libembree-dev
   # libraries that talk to devices
-  libusb-1.0-0-dev libumockdev-dev umockdev libmodbus-dev libsystemd-dev
+  libusb-1.0-0-dev libumockdev-dev umockdev libmodbus-dev libsystemd-dev libaravis-dev
   # tests and benchmarks
   libgtest-dev libgmock-dev libbenchmark-dev libvalijson-dev python3-numpy python3-jsonschema
-  opencv-doc
+  opencv-doc aravis-tools aravis-tools-cli
   python3-usb usbutils mbpoll python3-pymodbus python3-serial-asyncio
   clang-16 libclang-rt-16-dev  # scripts/fuzz.sh
 )

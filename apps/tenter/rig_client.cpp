@@ -2,6 +2,7 @@
 #include "rig_client.h"
 
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -17,7 +18,9 @@ namespace tenter::app {
 
 namespace {
 
-constexpr timeval kLongestWait{10, 0};
+/// A set of images may be taken several times, and the daemon may wait for its cameras.
+constexpr timeval kLongestWait{30, 0};
+constexpr std::size_t kMostFiles = 16;  // a rig has no more cameras
 constexpr std::size_t kLongestAnswer_bytes = std::size_t{4} << 20;
 
 Error lost(const std::string& what) { return Error{ErrorKind::kHardware, "", "tenterd", what, ""}; }
@@ -60,6 +63,40 @@ RigClient::~RigClient() {
   if (descriptor_ >= 0) close(descriptor_);
 }
 
+FileDescriptor::~FileDescriptor() {
+  if (number_ >= 0) close(number_);
+}
+
+std::size_t FileDescriptor::size_bytes() const {
+  struct stat status {};
+  return fstat(number_, &status) == 0 ? static_cast<std::size_t>(status.st_size) : 0;
+}
+
+/// The next piece of an answer, and the files that came with it.
+bool RigClient::receive() {
+  std::array<char, 4096> chunk{};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(kMostFiles * sizeof(int))> control{};
+  iovec piece{chunk.data(), chunk.size()};
+  msghdr message{};
+  message.msg_iov = &piece;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  const ssize_t n = recvmsg(descriptor_, &message, MSG_CMSG_CLOEXEC);
+  for (cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr && n > 0;
+       header = CMSG_NXTHDR(&message, header)) {
+    if (header->cmsg_level != SOL_SOCKET || header->cmsg_type != SCM_RIGHTS) continue;
+    const std::size_t count = (header->cmsg_len - CMSG_LEN(0)) / sizeof(int);
+    for (std::size_t i = 0; i < count; ++i) {
+      int number = -1;
+      std::memcpy(&number, CMSG_DATA(header) + i * sizeof(int), sizeof number);
+      files_.emplace_back(number);
+    }
+  }
+  if (n > 0) pending_.append(chunk.data(), static_cast<std::size_t>(n));
+  return n > 0;
+}
+
 Result<nlohmann::json> RigClient::call(const std::string& method, const nlohmann::json& params) {
   const nlohmann::json request{
       {"jsonrpc", "2.0"}, {"id", ++last_id_}, {"method", method}, {"params", params}};
@@ -70,11 +107,9 @@ Result<nlohmann::json> RigClient::call(const std::string& method, const nlohmann
     if (n <= 0) return lost("the connection is closed");
     sent += static_cast<std::size_t>(n);
   }
-  std::array<char, 4096> chunk{};
+  files_.clear();
   for (auto end = pending_.find('\n'); end == std::string::npos; end = pending_.find('\n')) {
-    const ssize_t n = recv(descriptor_, chunk.data(), chunk.size(), 0);
-    if (n <= 0 || pending_.size() > kLongestAnswer_bytes) return lost("no answer");
-    pending_.append(chunk.data(), static_cast<std::size_t>(n));
+    if (!receive() || pending_.size() > kLongestAnswer_bytes) return lost("no answer");
   }
   const auto end = pending_.find('\n');
   const auto answer = parseJson(std::string_view(pending_).substr(0, end), "answer");

@@ -3,6 +3,7 @@
 #include <optional>
 #include <thread>
 
+#include "camera_source.h"
 #include "device_preload.h"
 #include "interrupt.h"
 #include "tenter/twin/fault_player.h"
@@ -14,6 +15,7 @@ namespace {
 
 struct Options {
   ServedRigOptions rig;
+  CameraSourceOptions cameras;
   std::string state, modbus = "tcp", faults;
 };
 
@@ -23,6 +25,7 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--modbus", o.modbus, "How the load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
+  declareRigCameras(command, o.cameras);
   command.add_option("--fault", o.faults, "Script of faults (docs/formats/fault-script.md)");
   command.add_option("--protocol", o.rig.mount.protocol, "How the sample hangs")
       ->capture_default_str();
@@ -46,12 +49,13 @@ Result<std::unique_ptr<FaultPlayer>> play(std::optional<FaultScript> script, Ser
 Result<int> serve(const Options& o, Console& console) {
   std::optional<FaultScript> script;
   if (!o.faults.empty()) {
-    auto read = readFaultScript(o.faults, ServedRig::kAxes, o.modbus == "tcp");
+    auto read = readFaultScript(o.faults, {ServedRig::kAxes, o.modbus == "tcp", o.cameras.cameras});
     if (!read) return read.error();
     script = *std::move(read);
   }
-  if (auto ready = preloadDevices(); !ready) return ready.error();
   ServedRigOptions options = o.rig;
+  if (auto added = addCameras(o.cameras, options); !added) return added.error();
+  if (auto ready = preloadDevices(); !ready) return ready.error();
   options.state = o.state;
   options.tcp = o.modbus == "tcp";
   const auto rig = ServedRig::start(options);

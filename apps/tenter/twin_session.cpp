@@ -14,6 +14,7 @@
 #include "protocol_files.h"
 #include "rig_visit.h"
 #include "tenter/core/files.h"
+#include "tenter/session/mounting.h"
 #include "tenter/twin/fabrics.h"
 #include "tenter/twin/served_rig.h"
 
@@ -28,7 +29,8 @@ constexpr auto kPoll = 50ms;
 constexpr auto kStart = 20s;     // until the daemon listens
 constexpr auto kFarewell = 40s;  // longer than the daemon takes to unload
 constexpr std::size_t kMaxFile_bytes = std::size_t{256} << 20;
-constexpr std::string_view kMount = "mount.json", kTruth = "truth.jsonl", kLog = "tenterd.log";
+constexpr std::string_view kMount = "mount.json", kTruth = "truth.jsonl", kLog = "tenterd.log",
+                           kImages = "images.jsonl";
 
 /// Where the rig keeps its files while it is served.
 class StateFolder {
@@ -107,20 +109,37 @@ std::string daemonProgram() {
 }
 
 const FolderKind& rigTruthFolder() {
-  static const FolderKind kKind{
-      std::string(kMount), "\"protocol\"", {std::string(kTruth), std::string(kLog)}};
+  static const FolderKind kKind{std::string(kMount),
+                                "\"protocol\"",
+                                {std::string(kTruth), std::string(kLog), std::string(kImages)}};
   return kKind;
 }
 
 Result<void> keepTruth(const StateFolder& state, const std::string& folder) {
   return writeFolderAtomically(folder, rigTruthFolder(), [&](const fs::path& inside) {
-    for (const std::string_view name : {kMount, kTruth, kLog}) {
+    for (const std::string_view name : {kMount, kTruth, kLog, kImages}) {
+      if (name == kImages && !fs::exists(state / name)) continue;  // no cameras
       const auto text = readFile(state / name, kMaxFile_bytes);
       if (!text) return Result<void>(text.error());
       if (auto done = writeFileAtomically(inside / name, *text); !done) return done;
     }
     return Result<void>();
   });
+}
+
+/// What the cameras look at, and their calibration, where a session has them.
+Result<void> keepScene(const StateFolder& state, const fs::path& session) {
+  for (const auto& [from, to] : {std::pair("mounting.json", kMountingFile),
+                                 std::pair("calibration.json", kSessionCalibrationFile)}) {
+    if (!fs::exists(state / from)) continue;
+    const auto text = readFile(state / from, kMaxFile_bytes);
+    if (!text) return text.error();
+    std::error_code failed;
+    fs::create_directories((session / to).parent_path(), failed);
+    if (failed) return badInput((session / to).string(), "", failed.message());
+    if (auto done = writeFileAtomically(session / to, *text); !done) return done;
+  }
+  return {};
 }
 
 Result<int> runProtocol(const SessionCapture& capture, const std::string& protocol,
@@ -148,7 +167,12 @@ Result<int> captureSession(const SessionCapture& capture, Console& console) {
   if (auto ready = preloadDevices(); !ready) return ready.error();
   const auto state = StateFolder::make();
   if (!state) return state.error();
-  const auto rig = ServedRig::start({capture.mount, (*state)->path(), capture.tcp});
+  ServedRigOptions options;
+  options.mount = capture.mount;
+  options.state = (*state)->path();
+  options.tcp = capture.tcp;
+  if (auto added = addCameras(capture.cameras, options); !added) return added.error();
+  const auto rig = ServedRig::start(options);
   if (!rig) return rig.error();
   const std::string socket = (**state / "tenterd.sock").string();
   Result<int> ended = kDone;
@@ -161,6 +185,7 @@ Result<int> captureSession(const SessionCapture& capture, Console& console) {
     ended = runProtocol(capture, *protocol, socket, console);
   }
   if (!ended) return ended;
+  if (auto kept = keepScene(**state, capture.output); !kept) return kept.error();
   if (!capture.truth.empty()) {
     if (auto kept = keepTruth(**state, capture.truth); !kept) return kept.error();
   }

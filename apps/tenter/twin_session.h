@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "camera_source.h"
 #include "command.h"
 #include "tenter/twin/mounted_specimen.h"
 
@@ -11,6 +12,7 @@ namespace tenter::app {
 struct SessionCapture {
   MountOptions mount;
   bool tcp = true;
+  CameraSourceOptions cameras;  ///< Their number is 0: no images.
   std::string output;  ///< Folder of the session.
   std::string truth;   ///< Folder for what hung there and how it pulled; empty: not kept.
 };

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "protocol_files.h"
+#include "rig_snap.h"
 #include "rig_visit.h"
 #include "verbs.h"
 
@@ -68,6 +69,11 @@ Result<int> status(const Options& o, Console& console) {
   for (const Json& cell : answer->value("cells", Json::array())) {
     console.say("  " + cell.value("name", "") + "  " +
                 numberText(cell.value("net_N", Json()), "N") + "  " + cell.value("fault", ""));
+  }
+  for (const Json& camera : answer->value("cameras", Json::array())) {
+    console.say("  " + camera.value("name", "") + "  " + camera.value("serial", "") + "  " +
+                counted(camera.value("completed", std::size_t{0}), "frame") + "  " +
+                camera.value("fault", ""));
   }
   return kDone;
 }
@@ -151,7 +157,7 @@ void setUpPlain(CLI::App& command, Action& action) {
 }  // namespace
 
 Verb rigVerb() {
-  static constexpr std::array kRows = {
+  static const std::array kRows = {
       Verb{"status", "State, positions and tensions",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSocket, status); }},
       Verb{"stop", "Halt all axes at once; anybody may",
@@ -165,6 +171,7 @@ Verb rigVerb() {
       Verb{"pause", "Hold the run that is under way", setUpBeside<kPause>},
       Verb{"resume", "Go on with a run that was held", setUpBeside<kResume>},
       Verb{"abort", "End the run that is under way, and unload", setUpBeside<kAbort>},
+      rigSnap(),
       Verb{"jog", "Move one axis",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareJog, jog); }},
       Verb{"run", "Run a protocol and record the session; homes first if it must",

@@ -39,7 +39,7 @@ struct CaptureCommand {
   bool measurement = false, session = false, through_daemon = false;
   std::string modbus = "tcp";
   int nodes = 0;
-  std::string fabric, output, truth;
+  std::string fabric, output, truth, shown;
   ImageOptions images;
 };
 
@@ -56,7 +56,10 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
       ->check(CLI::Range(3, 1000));
 #ifdef TENTER_HARDWARE
   command.add_flag("--through-daemon", o.through_daemon,
-                   "A session through virtual devices and tenterd, in real time, without images");
+                   "A session through virtual devices and tenterd, in real time");
+  command.add_option("--images", o.shown,
+                     "What cameras show to the daemon: scene (the sample as it hangs), "
+                     "test-pattern, a picture, or a folder of pictures; without, it has none");
   command.add_option("--modbus", o.modbus, "How a session's load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
@@ -96,6 +99,12 @@ Result<int> captureThroughDaemon(const CaptureCommand& command, Console& console
                    command.capture.specimen, MountOptions{}.nodes};
   if (command.nodes != 0) session.mount.nodes = command.nodes;
   session.tcp = command.modbus == "tcp";
+  if (!command.shown.empty()) {
+    const bool drawn = command.shown == CameraSourceOptions::kScene ||
+                       command.shown == CameraSourceOptions::kTestPattern;
+    session.cameras = {command.images.cameras, command.shown, drawn ? command.images.width_px : 0,
+                       0};
+  }
   session.output = command.output;
   session.truth = command.truth;
   return captureSession(session, console);
@@ -175,7 +184,7 @@ Result<int> capture(const CaptureCommand& command, Console& console) {
 Verb twinVerb() {
   static const std::array kRows = {
 #ifdef TENTER_HARDWARE
-      twinServe(), twinTruth(),
+      twinServe(), twinCameras(), twinTruth(),
 #endif
       Verb{"fabrics", "Names of the virtual fabrics",
            [](CLI::App& c, Action& a) {

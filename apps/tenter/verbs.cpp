@@ -11,7 +11,7 @@ std::span<const Verb> verbs() {
       drapeVerb(),     invertVerb(),  twinVerb(),      protocolVerb(), sessionVerb(),
       calibrateVerb(), patternVerb(), correlateVerb(), demoVerb(),     versionVerb(),
 #ifdef TENTER_HARDWARE
-      rigVerb(),
+      rigVerb(),       camerasVerb(),
 #endif
   };
   return kVerbs;

@@ -19,6 +19,7 @@ Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();
 Verb rigVerb();
+Verb camerasVerb();
 Verb correlateVerb();
 Verb demoVerb();
 Verb versionVerb();
@@ -28,6 +29,7 @@ Verb sessionReplay();
 
 // Rows of `tenter twin` that need devices, twin_<name>.cpp.
 Verb twinServe();
+Verb twinCameras();
 Verb twinTruth();
 
 // Rows of `tenter calibrate`, calibrate_<name>.cpp.

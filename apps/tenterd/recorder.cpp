@@ -23,13 +23,31 @@ Recorder::~Recorder() {
 
 void Recorder::append(std::int64_t time_ns, RecordBody body) {
   const std::lock_guard lock(mutex_);
-  if (close_ns_ >= 0) return;
+  if (close_ns_ >= 0 && expected_ == 0) return;
   if (queue_.size() >= kLongestQueue) {
     if (fault_.empty()) fault_ = "the disk does not keep up";
     return;
   }
   queue_.push_back({std::max<std::int64_t>(0, time_ns - start_ns_), std::move(body)});
   changed_.notify_one();
+}
+
+std::shared_ptr<void> Recorder::expectFrames() {
+  const std::lock_guard lock(mutex_);
+  ++expected_;
+  return {this, [](Recorder* recorder) {
+            const std::lock_guard lock(recorder->mutex_);
+            --recorder->expected_;
+            recorder->changed_.notify_one();
+          }};
+}
+
+Result<FrameRecord> Recorder::addFrame(std::int64_t time_ns, std::span<const FrameImage> images) {
+  auto added = writer_->addFrame(std::max<std::int64_t>(0, time_ns - start_ns_), images);
+  if (added) return added;
+  const std::lock_guard lock(mutex_);
+  if (fault_.empty()) fault_ = added.error().message();
+  return added;
 }
 
 void Recorder::close(std::int64_t time_ns) {
@@ -69,9 +87,10 @@ void Recorder::write() {
     bool last = false;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return !queue_.empty() || close_ns_ >= 0; });
+      const auto ends = [this] { return close_ns_ >= 0 && expected_ == 0; };
+      changed_.wait(lock, [&] { return !queue_.empty() || ends(); });
       items.swap(queue_);
-      last = close_ns_ >= 0;
+      last = ends();
     }
     take(std::move(items));
     if (!last) continue;

@@ -6,6 +6,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <thread>
 
@@ -24,6 +25,11 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   void append(std::int64_t time_ns, RecordBody body);
+  /// While what it returns lives, the session stays open, close() or not: of whoever is to add a
+  /// frame.
+  std::shared_ptr<void> expectFrames();
+  /// Images of one moment, on the disk before it returns; from another thread than append().
+  Result<FrameRecord> addFrame(std::int64_t time_ns, std::span<const FrameImage> images);
   /// Closes the session once all before it is written; does not wait.
   void close(std::int64_t time_ns);
 
@@ -46,6 +52,7 @@ class Recorder {
   std::condition_variable changed_;
   std::deque<Item> queue_;
   std::int64_t close_ns_ = -1;
+  int expected_ = 0;  ///< Frames that are to come.
   bool closed_ = false;
   std::string fault_;
   std::thread thread_;

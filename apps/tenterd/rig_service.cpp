@@ -54,16 +54,22 @@ Result<std::unique_ptr<RigService>> RigService::start(RigConfig config) {
   options.on_event = [events](const LoadCellEvent& event) { events->push(event); };
   auto scanner = LoadCellScanner::start(config.cells, options);
   if (!scanner) return scanner.error();
-  return std::unique_ptr<RigService>(
-      new RigService(std::move(config), *std::move(bank), std::move(events), *std::move(scanner)));
+  auto section = parseCameraSection(config.text, "cameras");
+  if (!section) return section.error();
+  auto cameras = std::make_unique<CaptureService>(*std::move(section));
+  return std::unique_ptr<RigService>(new RigService(std::move(config), *std::move(bank),
+                                                    std::move(events), *std::move(scanner),
+                                                    std::move(cameras)));
 }
 
 RigService::RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<CellEvents> events,
-                       std::unique_ptr<LoadCellScanner> scanner)
+                       std::unique_ptr<LoadCellScanner> scanner,
+                       std::unique_ptr<CaptureService> cameras)
     : config_(config),
       bank_(std::move(bank)),
       cell_events_(std::move(events)),
       scanner_(std::move(scanner)),
+      cameras_(std::move(cameras)),
       machine_(std::move(config)),
       status_{{"rig", config_.name},
               {"state", rigStateName(machine_.state())},
@@ -342,7 +348,13 @@ void RigService::record(const RigTick& tick, const RigOrders& orders) {
   for (RecordBody& body : journal_.tickRecords(tick)) {
     recorder_->append(tick.time_ns, std::move(body));
   }
-  for (const RecordBody& body : orders.records) recorder_->append(tick.time_ns, body);
+  for (const RecordBody& body : orders.records) {
+    recorder_->append(tick.time_ns, body);
+    const auto* decision = std::get_if<Decision>(&body);
+    if (decision == nullptr || decision->name != "capture" || !cameras_->any()) continue;
+    cameras_->request(nlohmann::json::parse(decision->data).value("index", std::int64_t{0}),
+                      recorder_);
+  }
   if (!orders.run_ended) return;
   recorder_->close(tick.time_ns);
   const std::lock_guard lock(command_mutex_);
@@ -399,8 +411,13 @@ void RigService::publish(const RigTick& tick) {
 }
 
 nlohmann::json RigService::status() const {
-  const std::lock_guard lock(status_mutex_);
-  return status_;
+  nlohmann::json status;
+  {
+    const std::lock_guard lock(status_mutex_);
+    status = status_;
+  }
+  if (cameras_->any()) status["cameras"] = cameras_->status();
+  return status;
 }
 
 }  // namespace tenter::daemon

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "capture.h"
 #include "fault_names.h"
 #include "recorder.h"
 #include "tenter/rig/actuator_bank.h"
@@ -45,6 +46,7 @@ class RigService {
   void operatorChanged() { operator_changed_ = true; }
   nlohmann::json status() const;
   const RigConfig& config() const { return config_; }
+  CaptureService& cameras() { return *cameras_; }
 
  private:
   struct Waiting {
@@ -53,7 +55,7 @@ class RigService {
   };
 
   RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<CellEvents> events,
-             std::unique_ptr<LoadCellScanner> scanner);
+             std::unique_ptr<LoadCellScanner> scanner, std::unique_ptr<CaptureService> cameras);
   void tick();
   RigTick readAll();
   void noteFaults(const RigTick& tick);
@@ -79,6 +81,7 @@ class RigService {
   ActuatorBank bank_;
   std::shared_ptr<CellEvents> cell_events_;
   std::unique_ptr<LoadCellScanner> scanner_;
+  std::unique_ptr<CaptureService> cameras_;
   RigMachine machine_;
   std::atomic<bool> quitting_{false}, operated_{false}, armed_{false}, operator_changed_{false};
   /// A device did not confirm that it halted: it is told again, and not kept alive meanwhile.

@@ -19,6 +19,8 @@ using Range = JsonReader::Range;
 
 constexpr int kParseError = -32700, kInvalidRequest = -32600, kNoMethod = -32601;
 constexpr int kRefused = -32000;
+/// Until all cameras are open: some seconds after the daemon has started.
+constexpr std::chrono::seconds kCamerasLimit{10};
 constexpr std::size_t kMaxText = 256, kMaxProtocol_bytes = 512 * 1024;
 
 struct PlainRow {
@@ -73,7 +75,8 @@ void Rpc::tick() { service_.setOperated(lease_.held(monotonic_ns())); }
 
 void Rpc::clientGone(const Client& client) { lease_.release(client.connection); }
 
-std::string Rpc::answer(std::string_view line, const Client& client) {
+std::string Rpc::answer(std::string_view line, const Client& client,
+                        std::vector<Descriptor>& attached) {
   const auto parsed = parseJson(line, "request");
   if (!parsed) return failure(nullptr, kParseError, parsed.error().message());
   const Json& request = *parsed;
@@ -86,7 +89,7 @@ std::string Rpc::answer(std::string_view line, const Client& client) {
   }
   const Json params = request.value("params", Json::object());
   const std::string method = request["method"];
-  const auto result = dispatch(method, params, client);
+  const auto result = dispatch(method, params, client, attached);
   if (!request.contains("id")) return "";
   if (result) {
     return Json{{"jsonrpc", "2.0"}, {"id", id}, {"result", *result}}.dump(
@@ -102,7 +105,8 @@ std::string Rpc::answer(std::string_view line, const Client& client) {
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const Client& client) {
+Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const Client& client,
+                           std::vector<Descriptor>& attached) {
   const std::int64_t now_ns = monotonic_ns();
   if (method == "stop") {
     service_.stopNow();
@@ -110,6 +114,7 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
     return Json{{"halted", true}};
   }
   if (method == "status") return status();
+  if (method == "frames") return frames(attached);
   if (method == "lease") {
     const Lease::Taken taken = lease_.acquire(client.connection, client.user, now_ns);
     if (taken == Lease::Taken::kRefused) {
@@ -151,6 +156,12 @@ Result<Json> Rpc::status() const {
   return status;
 }
 
+Result<Json> Rpc::frames(std::vector<Descriptor>& attached) {
+  const auto set = service_.cameras().look();
+  if (!set) return set.error();
+  return shareFrames(**set, service_.cameras().section(), attached);
+}
+
 Result<Json> Rpc::plain(Kind kind) {
   RigCommand command;
   command.kind = kind;
@@ -186,9 +197,11 @@ Result<Json> Rpc::run(const Json& params, const Client& client) {
   if (auto fits = checkAgainstRig(*protocol, service_.config()); !fits) return fits.error();
   const SessionHeader header = headerFrom(in, *protocol, service_.config());
   if (!in.ok()) return in.error();
+  if (auto seen = service_.cameras().awaitAll(kCamerasLimit); !seen) return seen.error();
   auto writer = SessionWriter::create(folder, header);
   if (!writer) return writer.error();
-  // A busy disk may have taken longer than the lease lasts, and the client waited for it.
+  // Cameras or a busy disk may have taken longer than the lease lasts, and the client waited for
+  // it.
   const bool still_operates = lease_.extend(client.connection, monotonic_ns());
   tick();
   RigCommand command;

@@ -5,7 +5,9 @@
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "frame_descriptors.h"
 #include "lease.h"
 #include "rig_service.h"
 
@@ -23,18 +25,21 @@ class Rpc {
   explicit Rpc(RigService& service) : service_(service) {}
 
   /// The answer's line without its end; empty for a notification. Whatever the line holds.
-  std::string answer(std::string_view line, const Client& client);
+  /// `attached`: what goes to the client along with it, in the order that the answer counts by.
+  std::string answer(std::string_view line, const Client& client,
+                     std::vector<Descriptor>& attached);
   void clientGone(const Client& client);
   /// To be called in every tick: tells the service whether somebody holds the rig.
   void tick();
 
  private:
   Result<nlohmann::json> status() const;
+  Result<nlohmann::json> frames(std::vector<Descriptor>& attached);
   Result<nlohmann::json> run(const nlohmann::json& params, const Client& client);
   Result<nlohmann::json> jog(const nlohmann::json& params);
   Result<nlohmann::json> plain(RigCommand::Kind kind);
   Result<nlohmann::json> dispatch(const std::string& method, const nlohmann::json& params,
-                                  const Client& client);
+                                  const Client& client, std::vector<Descriptor>& attached);
 
   RigService& service_;
   Lease lease_;

@@ -47,8 +47,28 @@ bool mayEnter(const ucred& peer, gid_t group) {
   return std::find(groups.begin(), groups.begin() + count, group) != groups.begin() + count;
 }
 
-bool sendAll(int descriptor, const std::string& text) {
+/// Descriptors go with the first byte of the text.
+bool sendAll(int descriptor, std::string& text, const std::vector<Descriptor>& attached) {
   std::size_t sent = 0;
+  if (!attached.empty()) {
+    std::vector<int> numbers;
+    for (const Descriptor& one : attached) numbers.push_back(one.number());
+    const std::size_t size_bytes = numbers.size() * sizeof(int);
+    std::vector<char> control(CMSG_SPACE(size_bytes));
+    iovec first{text.data(), 1};
+    msghdr message{};
+    message.msg_iov = &first;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    cmsghdr* header = CMSG_FIRSTHDR(&message);
+    header->cmsg_level = SOL_SOCKET;
+    header->cmsg_type = SCM_RIGHTS;
+    header->cmsg_len = CMSG_LEN(size_bytes);
+    std::memcpy(CMSG_DATA(header), numbers.data(), size_bytes);
+    if (sendmsg(descriptor, &message, MSG_NOSIGNAL) != 1) return false;
+    sent = 1;
+  }
   while (sent < text.size()) {
     const ssize_t n = send(descriptor, text.data() + sent, text.size() - sent, MSG_NOSIGNAL);
     if (n <= 0) return false;
@@ -151,9 +171,12 @@ void SocketServer::serve(Connection& connection, const Client& client) {
     pending.append(chunk.data(), static_cast<std::size_t>(n));
     for (auto end = pending.find('\n'); open && end != std::string::npos;
          end = pending.find('\n')) {
-      const std::string answer = rpc_.answer(std::string_view(pending).substr(0, end), client);
+      std::vector<Descriptor> attached;
+      std::string answer = rpc_.answer(std::string_view(pending).substr(0, end), client, attached);
       pending.erase(0, end + 1);
-      if (!answer.empty()) open = sendAll(connection.descriptor, answer + "\n");
+      if (answer.empty()) continue;
+      answer += '\n';
+      open = sendAll(connection.descriptor, answer, attached);
     }
     if (pending.size() > kLongestLine_bytes) break;
   }

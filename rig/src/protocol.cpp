@@ -8,7 +8,7 @@
 
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
-#include "tenter/rig/toml_document.h"
+#include "tenter/core/toml_document.h"
 
 namespace tenter {
 namespace {

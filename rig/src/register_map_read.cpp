@@ -6,8 +6,8 @@
 
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
+#include "tenter/core/toml_document.h"
 #include "tenter/rig/register_map.h"
-#include "tenter/rig/toml_document.h"
 
 namespace tenter {
 namespace {

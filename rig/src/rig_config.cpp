@@ -7,8 +7,8 @@
 
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
+#include "tenter/core/toml_document.h"
 #include "tenter/rig/shipped_files.h"
-#include "tenter/rig/toml_document.h"
 
 namespace tenter {
 namespace {
@@ -160,7 +160,7 @@ Result<RigConfig> parse(std::string_view toml, const std::string& file,
   const auto json = jsonOfToml(toml, file);
   if (!json) return json.error();
   JsonReader in(*json, file);
-  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell"}, kPage);
+  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell", "cameras"}, kPage);
   in.integer("schema_version", 1, 1);
   RigConfig rig;
   rig.text = toml;

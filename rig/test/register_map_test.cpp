@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tenter/core/files.h"
-#include "tenter/rig/toml_document.h"
+#include "tenter/core/toml_document.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
 

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "machine_bench.h"
+#include "tenter/core/toml_document.h"
 #include "tenter/rig/shipped_files.h"
-#include "tenter/rig/toml_document.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
 

@@ -119,7 +119,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static Daemon daemon;
   const std::string line = tamed({reinterpret_cast<const char*>(data), size});
   const tenter::daemon::Client client{1, "somebody"};
-  const std::string answer = daemon.rpc->answer(line, client);
+  std::vector<Descriptor> attached;
+  const std::string answer = daemon.rpc->answer(line, client, attached);
   if (answer.empty()) {
     require(!Json::parse(line, nullptr, false).contains("id"),
             "only a notification stays unanswered");

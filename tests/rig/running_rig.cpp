@@ -22,10 +22,11 @@ T valueOf(Result<T> result) {
 
 }  // namespace
 
-RunningRig::RunningRig(bool tcp) {
+RunningRig::RunningRig(bool tcp, std::optional<VirtualCamerasOptions> cameras) {
   ServedRigOptions options;
   options.state = folder_.path();
   options.tcp = tcp;
+  options.cameras = std::move(cameras);
   rig_ = valueOf(ServedRig::start(options));
   startDaemon();
 }

@@ -14,7 +14,7 @@ namespace tenter::rig_system_test {
 /// A virtual rig, and the shipped daemon running on it. Throws what goes wrong.
 class RunningRig {
  public:
-  explicit RunningRig(bool tcp = true);
+  explicit RunningRig(bool tcp = true, std::optional<VirtualCamerasOptions> cameras = {});
   ~RunningRig();
   RunningRig(const RunningRig&) = delete;
   RunningRig& operator=(const RunningRig&) = delete;

@@ -45,6 +45,25 @@ struct Apply {
   void operator()(const AddedForceFault& kind) const {
     rig.addForce(fault.device, begins ? kind.force_N : 0.0);
   }
+  void operator()(const CameraFault& kind) const {
+    VirtualCameras* cameras = rig.cameras();
+    if (cameras == nullptr) return;
+    switch (kind.kind) {
+      case CameraFault::Kind::kLostPackets:
+        return cameras->losePackets(fault.device, begins ? kind.lost_share : 0.0);
+      case CameraFault::Kind::kUnplugged:
+        if (begins) return cameras->unplug(fault.device);
+        return (void)cameras->replug(fault.device);
+      case CameraFault::Kind::kFrozen:
+        return cameras->freeze(fault.device, begins);
+      case CameraFault::Kind::kSaturated:
+        return cameras->overexpose(fault.device, begins);
+      case CameraFault::Kind::kSwapped:  // a second exchange undoes the first
+        return (void)cameras->exchange(fault.device, kind.other);
+      case CameraFault::Kind::kDefocused:
+        return cameras->defocus(fault.device, begins ? kind.blur_px : 0.0);
+    }
+  }
 };
 
 }  // namespace
@@ -97,14 +116,16 @@ void FaultPlayer::play() {
 void FaultPlayer::write(const ScriptedFault& fault, bool begins, double time_s,
                         const RigSnapshot& now) {
   const auto device = static_cast<std::size_t>(fault.device);
-  const nlohmann::ordered_json line{{"monotonic_ns", monotonic_ns()},
-                                    {"time_s", time_s},
-                                    {"fault", fault.name},
-                                    {"device", fault.deviceName()},
-                                    {"kind", fault.kind_name},
-                                    {"what", begins ? "begins" : "ends"},
-                                    {"position_m", now.positions_m[device]},
-                                    {"tension_N", now.tensions_N[device]}};
+  nlohmann::ordered_json line{{"monotonic_ns", monotonic_ns()},
+                              {"time_s", time_s},
+                              {"fault", fault.name},
+                              {"device", fault.deviceName()},
+                              {"kind", fault.kind_name},
+                              {"what", begins ? "begins" : "ends"}};
+  if (!fault.on_camera) {
+    line["position_m"] = now.positions_m[device];
+    line["tension_N"] = now.tensions_N[device];
+  }
   std::fprintf(log_.get(), "%s\n", line.dump().c_str());
   std::fflush(log_.get());
 }

@@ -9,7 +9,7 @@
 
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
-#include "tenter/rig/toml_document.h"
+#include "tenter/core/toml_document.h"
 
 namespace tenter {
 namespace {
@@ -25,6 +25,20 @@ constexpr std::string_view kUnplug = "unplug", kSlow = "slow", kAddedForce = "ad
 constexpr std::array<std::string_view, 6> kPhaseNames{"idle",    "homing",  "jog",
                                                       "loading", "holding", "unloading"};
 
+constexpr std::string_view kCamera = "camera-";
+
+struct CameraFaultRow {
+  std::string_view name;
+  CameraFault::Kind kind;
+};
+constexpr std::array<CameraFaultRow, 6> kCameraFaults{
+    {{"lost-packets", CameraFault::Kind::kLostPackets},
+     {kUnplug, CameraFault::Kind::kUnplugged},
+     {"frozen", CameraFault::Kind::kFrozen},
+     {"saturated", CameraFault::Kind::kSaturated},
+     {"swapped", CameraFault::Kind::kSwapped},
+     {"defocused", CameraFault::Kind::kDefocused}}};
+
 std::string listed(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
@@ -35,21 +49,33 @@ std::chrono::microseconds microseconds(double time_ms) {
   return std::chrono::microseconds(std::llround(1e3 * time_ms));
 }
 
-/// "axis-3" or "cell-3", counted from 1.
-void readDevice(JsonReader& in, ScriptedFault& fault, int axes) {
+/// Number of "axis-3" for the prefix "axis-", counted from 1; nothing if it is none of so many.
+std::optional<int> numberBehind(std::string_view prefix, std::string_view name, int most) {
+  if (!name.starts_with(prefix)) return std::nullopt;
+  name.remove_prefix(prefix.size());
+  int number = 0;
+  const auto [end, problem] = std::from_chars(name.data(), name.data() + name.size(), number);
+  const bool good =
+      problem == std::errc() && end == name.data() + name.size() && number >= 1 && number <= most;
+  return good ? std::optional(number) : std::nullopt;
+}
+
+/// "axis-3", "cell-3" or "camera-3".
+void readDevice(JsonReader& in, ScriptedFault& fault, const FaultScriptRig& rig) {
   const std::string name = in.text("device", kMaxName);
   if (!in.ok()) return;
-  fault.on_axis = name.starts_with("axis-");
-  int number = 0;
-  const char* begin = name.data() + std::min<std::size_t>(5, name.size());
-  const auto [end, problem] = std::from_chars(begin, name.data() + name.size(), number);
-  const bool known = (fault.on_axis || name.starts_with("cell-")) && problem == std::errc() &&
-                     end == name.data() + name.size() && number >= 1 && number <= axes;
-  if (!known) {
-    in.fail("device", "there is no device \"" + name + "\"",
-            "axis-1 to axis-" + std::to_string(axes) + ", cell-1 to cell-" + std::to_string(axes));
+  const auto axis = numberBehind("axis-", name, rig.axes);
+  const auto cell = numberBehind("cell-", name, rig.axes);
+  const auto camera = numberBehind(kCamera, name, rig.cameras);
+  if (!axis && !cell && !camera) {
+    const std::string last = std::to_string(rig.axes);
+    std::string known = "axis-1 to axis-" + last + ", cell-1 to cell-" + last;
+    if (rig.cameras > 0) known += ", camera-1 to camera-" + std::to_string(rig.cameras);
+    return in.fail("device", "there is no device \"" + name + "\"", known);
   }
-  fault.device = number - 1;
+  fault.on_axis = axis.has_value();
+  fault.on_camera = camera.has_value();
+  fault.device = axis.value_or(cell.value_or(camera.value_or(1))) - 1;
 }
 
 void readAxisKind(JsonReader& in, ScriptedFault& fault) {
@@ -99,6 +125,51 @@ void readCellKind(JsonReader& in, ScriptedFault& fault, bool tcp) {
   fault.kind = *kind;
 }
 
+void readCameraKind(JsonReader& in, ScriptedFault& fault, const FaultScriptRig& rig) {
+  const auto row =
+      std::find_if(kCameraFaults.begin(), kCameraFaults.end(),
+                   [&](const CameraFaultRow& known) { return known.name == fault.kind_name; });
+  if (row == kCameraFaults.end()) {
+    return in.fail("kind", "a camera has no fault \"" + fault.kind_name + "\"",
+                   listed(cameraFaultNames()));
+  }
+  if (fault.count != 0) in.fail("count", "this fault lasts", "for_s ends it");
+  CameraFault kind{row->kind, 0.0, 0.0, (fault.device + 1) % std::max(1, rig.cameras)};
+  if (kind.kind == CameraFault::Kind::kLostPackets) {
+    kind.lost_share = 0.01 * in.number("lost_percent", Range::positive(100.0));
+  }
+  if (kind.kind == CameraFault::Kind::kDefocused) {
+    kind.blur_px = in.number("blur_px", Range::positive(100.0));
+  }
+  if (kind.kind == CameraFault::Kind::kSwapped && in.has("with")) {
+    const auto other = numberBehind(kCamera, in.text("with", kMaxName), rig.cameras);
+    if (in.ok() && !other) in.fail("with", "there is no such camera");
+    kind.other = other.value_or(1) - 1;
+  }
+  if (in.ok() && kind.kind == CameraFault::Kind::kSwapped && kind.other == fault.device) {
+    in.fail("with", "must be another camera");
+  }
+  fault.kind = kind;
+}
+
+/// Keys that belong to one kind alone.
+void refuseStrayKeys(JsonReader& in, const ScriptedFault& fault) {
+  constexpr std::array<std::pair<const char*, std::string_view>, 4> kOwners{
+      {{"added_N", kAddedForce},
+       {"lost_percent", "lost-packets"},
+       {"blur_px", "defocused"},
+       {"with", "swapped"}}};
+  for (const auto& [key, owner] : kOwners) {
+    if (in.ok() && in.has(key) && fault.kind_name != owner) {
+      in.fail(key, "belongs to " + std::string(owner));
+    }
+  }
+  if (!fault.on_camera) return;
+  for (const char* key : {"force_N", "position_m", "delay_ms"}) {
+    if (in.ok() && in.has(key)) in.fail(key, "a camera has none");
+  }
+}
+
 void readDelay(JsonReader& in, FaultTrigger& trigger) {
   if (!in.has("delay_s")) return;
   if (!in.json()["delay_s"].is_array()) {
@@ -145,25 +216,26 @@ FaultTrigger readTrigger(JsonReader& in, const std::set<std::string>& names) {
   return trigger;
 }
 
-ScriptedFault readFault(JsonReader in, std::size_t index, int axes, bool tcp,
+ScriptedFault readFault(JsonReader in, std::size_t index, const FaultScriptRig& rig,
                         std::set<std::string>& names) {
-  onlyKnownKeys(in,
-                {"name", "device", "kind", "at_s", "phase", "force_N", "position_m", "after",
-                 "delay_s", "times", "count", "for_s", "delay_ms", "added_N"},
-                kPage);
+  onlyKnownKeys(
+      in,
+      {"name", "device", "kind", "at_s", "phase", "force_N", "position_m", "after", "delay_s",
+       "times", "count", "for_s", "delay_ms", "added_N", "lost_percent", "blur_px", "with"},
+      kPage);
   ScriptedFault fault;
   fault.name = in.textOr("name", "fault-" + std::to_string(index + 1));
-  readDevice(in, fault, axes);
+  readDevice(in, fault, rig);
   fault.kind_name = in.text("kind", kMaxName);
   if (in.has("for_s")) fault.for_s = in.number("for_s", Range::positive(kMaxTime_s));
   if (in.has("count")) fault.count = static_cast<int>(in.integer("count", 1, kMaxCount));
   if (in.ok() && fault.for_s && fault.count != 0) {
     in.fail("count", "either count or for_s ends a fault");
   }
-  if (in.ok() && in.has("added_N") && fault.kind_name != kAddedForce) {
-    in.fail("added_N", "belongs to added-force");
-  }
-  if (in.ok()) fault.on_axis ? readAxisKind(in, fault) : readCellKind(in, fault, tcp);
+  refuseStrayKeys(in, fault);
+  if (in.ok() && fault.on_axis) readAxisKind(in, fault);
+  if (in.ok() && fault.on_camera) readCameraKind(in, fault, rig);
+  if (in.ok() && !fault.on_axis && !fault.on_camera) readCellKind(in, fault, rig.tcp);
   if (in.ok() && fault.on_axis && in.has("delay_ms") && fault.kind_name != kSlow) {
     in.fail("delay_ms", "belongs to late-answer, dribble and slow");
   }
@@ -188,7 +260,8 @@ std::optional<RigPhase> findRigPhase(std::string_view name) {
 }
 
 std::string ScriptedFault::deviceName() const {
-  return (on_axis ? "axis-" : "cell-") + std::to_string(device + 1);
+  const std::string_view prefix = on_axis ? "axis-" : on_camera ? kCamera : "cell-";
+  return std::string(prefix) + std::to_string(device + 1);
 }
 
 std::vector<std::string> axisFaultNames() {
@@ -205,14 +278,20 @@ std::vector<std::string> cellFaultNames() {
   return names;
 }
 
-Result<FaultScript> readFaultScript(const std::filesystem::path& file, int axes, bool tcp) {
-  const Result<std::string> text = readFile(file, kMaxFile_bytes);
-  if (!text) return text.error();
-  return parseFaultScript(*text, file.string(), axes, tcp);
+std::vector<std::string> cameraFaultNames() {
+  std::vector<std::string> names;
+  for (const CameraFaultRow& row : kCameraFaults) names.emplace_back(row.name);
+  return names;
 }
 
-Result<FaultScript> parseFaultScript(std::string_view toml, const std::string& file, int axes,
-                                     bool tcp) {
+Result<FaultScript> readFaultScript(const std::filesystem::path& file, const FaultScriptRig& rig) {
+  const Result<std::string> text = readFile(file, kMaxFile_bytes);
+  if (!text) return text.error();
+  return parseFaultScript(*text, file.string(), rig);
+}
+
+Result<FaultScript> parseFaultScript(std::string_view toml, const std::string& file,
+                                     const FaultScriptRig& rig) {
   const auto json = jsonOfToml(toml, file);
   if (!json) return json.error();
   JsonReader in(*json, file);
@@ -225,7 +304,7 @@ Result<FaultScript> parseFaultScript(std::string_view toml, const std::string& f
     in.fail("fault", "must be there 1 to 1000 times");
   std::set<std::string> names;
   for (std::size_t i = 0; i < size && in.ok(); ++i) {
-    script.faults.push_back(readFault(in.element("fault", i), i, axes, tcp, names));
+    script.faults.push_back(readFault(in.element("fault", i), i, rig, names));
   }
   if (!in.ok()) return in.error();
   return script;

@@ -47,6 +47,7 @@ LiveSpecimen::LiveSpecimen(std::unique_ptr<MountedSpecimen> specimen,
     : specimen_(std::move(specimen)),
       positions_m_(specimen_->moment().at_m),
       moment_(specimen_->moment()),
+      still_(makeStill()),
       friction_{kPulley, kPulley, kPulley, kPulley, kPulley, kPulley, kPulley, kPulley} {
   if (!truth.empty()) truth_.open(truth);
   writeTruth();
@@ -88,6 +89,17 @@ double LiveSpecimen::felt_N(int axis) const {
   return std::max(0.0, pull_N(axis) + friction_.at(static_cast<std::size_t>(axis)).force_N());
 }
 
+std::shared_ptr<const LiveSpecimen::Still> LiveSpecimen::still() const {
+  const std::lock_guard lock(mutex_);
+  return still_;
+}
+
+std::shared_ptr<const LiveSpecimen::Still> LiveSpecimen::makeStill() const {
+  auto shape = specimen_->shape();
+  if (!shape) return nullptr;
+  return std::make_shared<const Still>(Still{specimen_->moment().at_m, *std::move(shape)});
+}
+
 void LiveSpecimen::run() {
   yieldToOthers();
   std::unique_lock lock(mutex_);
@@ -98,8 +110,10 @@ void LiveSpecimen::run() {
     lock.unlock();
     specimen_->follow(wanted_m);  // where it fails, readers go on along the last equilibrium
     writeTruth();
+    auto still = makeStill();
     lock.lock();
     moment_ = specimen_->moment();
+    still_ = std::move(still);
     moved_.wait_for(lock, kPause, [this] { return quitting_; });
   }
 }

@@ -33,10 +33,17 @@ class LiveSpecimen {
   double tension_N(int axis) const;
   /// What the cell behind the pulley feels: with the pulley's friction, and none below 0.
   double felt_N(int axis) const;
+  /// The last equilibrium, and the actuators' positions that it is of; null if none hangs on cords.
+  struct Still {
+    Positions at_m{};
+    SheetShape shape;
+  };
+  std::shared_ptr<const Still> still() const;
 
  private:
   void run();
   void writeTruth();
+  std::shared_ptr<const Still> makeStill() const;
   double pull_N(int axis) const;  ///< Precondition: the lock is held.
 
   std::unique_ptr<MountedSpecimen> specimen_;  ///< Of the thread, but for what never changes.
@@ -45,6 +52,7 @@ class LiveSpecimen {
   std::condition_variable moved_;
   Positions positions_m_{};
   MountedSpecimen::Moment moment_;
+  std::shared_ptr<const Still> still_;
   std::array<CordFriction, MountedSpecimen::kAxes> friction_;
   bool quitting_ = false;
   std::thread thread_;

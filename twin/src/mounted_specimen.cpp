@@ -230,6 +230,14 @@ const MountedSpecimen::Moment& MountedSpecimen::moment() const { return impl_->m
 const MountedSpecimen::Statistics& MountedSpecimen::statistics() const { return impl_->statistics; }
 const MountOptions& MountedSpecimen::options() const { return impl_->options; }
 
+std::optional<SheetShape> MountedSpecimen::shape() const {
+  if (!impl_->sample) return std::nullopt;
+  const HungSample& sample = *impl_->sample;
+  const ClothState& state = sample.state();
+  return SheetShape{sample.lines(), sample.stops(0), sample.stops(1),
+                    state.positions(sample.system().sheet().nodeCount()), state.clips};
+}
+
 bool MountedSpecimen::hasCord(int axis) const {
   return impl_->line_of.at(static_cast<std::size_t>(axis)) >= 0;
 }

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "live_specimen.h"
+#include "scene_source.h"
 #include "tenter/core/files.h"
 #include "tenter/rig/shipped_files.h"
 #include "tenter/rig/tic_protocol.h"
@@ -75,6 +76,7 @@ Result<void> ServedRig::serve() {
     if (!server) return server.error();
     servers_.push_back(*std::move(server));
   }
+  if (auto served = serveCameras(); !served) return served;
   std::vector<VirtualActuatorSpec> devices;
   for (int i = 0; i < kAxes; ++i) {
     VirtualActuatorSpec device;
@@ -92,6 +94,19 @@ Result<void> ServedRig::serve() {
   usb_->observe([this](int device, const VirtualActuatorState& state) {
     follow(device, state.position_units * kMetresPerMicrostep);
   });
+  return {};
+}
+
+Result<void> ServedRig::serveCameras() {
+  if (options_.scene) {
+    auto scene = prepareScene(options_, [this] { return specimen_->still(); });
+    if (!scene) return scene.error();
+    options_.cameras = *std::move(scene);
+  }
+  if (!options_.cameras) return {};
+  auto cameras = VirtualCameras::serve(*options_.cameras);
+  if (!cameras) return cameras.error();
+  cameras_ = *std::move(cameras);
   return {};
 }
 
@@ -134,6 +149,7 @@ std::string ServedRig::configuration() const {
          << "\ntravel_m = [0.0, 0.08]\nmax_speed_m_per_s = 0.004\n"
          << "max_acceleration_m_per_s2 = 0.1\ncell = \"cell-" << number(i) << "\"\n";
   }
+  if (cameras_) toml << cameras_->configuration();
   return toml.str();
 }
 

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tenter/rig/toml_document.h"
+#include "tenter/core/toml_document.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
 #include "tenter/twin/fault_schedule.h"
@@ -24,13 +24,13 @@ std::string script(const std::string& keys) {
 }
 
 FaultScript parsed(const std::string& keys, bool tcp = true) {
-  auto result = parseFaultScript(script(keys), "s.toml", kAxes, tcp);
+  auto result = parseFaultScript(script(keys), "s.toml", {kAxes, tcp});
   EXPECT_TRUE(result.ok()) << result.error().message();
   return *std::move(result);
 }
 
 std::string refusal(const std::string& toml, bool tcp = true) {
-  const auto result = parseFaultScript(toml, "s.toml", kAxes, tcp);
+  const auto result = parseFaultScript(toml, "s.toml", {kAxes, tcp});
   if (result) return "";
   EXPECT_EQ(result.error().kind, ErrorKind::kBadInput);
   return result.error().message();
@@ -54,6 +54,38 @@ TEST(FaultScript, EveryKindIsReadAndInTheSchema) {
       EXPECT_THAT(bySchema(script(keys)), IsEmpty()) << kind;
     }
   }
+}
+
+TEST(FaultScript, EveryFaultOfACameraIsReadAndInTheSchema) {
+  for (const std::string& kind : cameraFaultNames()) {
+    std::string keys = "device = \"camera-4\"\nat_s = 1.0\nkind = \"" + kind + "\"";
+    if (kind == "lost-packets") keys += "\nlost_percent = 0.5";
+    if (kind == "defocused") keys += "\nblur_px = 2.0";
+    const auto read = parseFaultScript(script(keys), "s.toml", {kAxes, true, 4});
+    ASSERT_TRUE(read) << read.error().message();
+    EXPECT_EQ(read->faults.at(0).deviceName(), "camera-4");
+    EXPECT_THAT(bySchema(script(keys)), IsEmpty()) << kind;
+    const auto& fault = std::get<CameraFault>(read->faults.at(0).kind);
+    if (kind == "swapped") EXPECT_EQ(fault.other, 0);
+    if (kind == "lost-packets") EXPECT_DOUBLE_EQ(fault.lost_share, 0.005);
+  }
+}
+
+TEST(FaultScript, WhatACameraDoesNotHaveIsRefused) {
+  const auto refusalOf = [](const std::string& keys, int cameras = 4) {
+    const auto read = parseFaultScript(script("device = \"camera-2\"\n" + keys), "s.toml",
+                                       {kAxes, true, cameras});
+    return read ? "" : read.error().message();
+  };
+  const std::string when = "at_s = 1.0\n";
+  EXPECT_THAT(refusalOf(when + "kind = \"frozen\"", 0), HasSubstr("no device"));
+  EXPECT_THAT(refusalOf(when + "kind = \"stall\""), HasSubstr("lost-packets"));
+  EXPECT_THAT(refusalOf(when + "kind = \"lost-packets\""), HasSubstr("lost_percent"));
+  EXPECT_THAT(refusalOf(when + "kind = \"swapped\"\nwith = \"camera-2\""), HasSubstr("with"));
+  EXPECT_THAT(refusalOf(when + "kind = \"swapped\"\nwith = \"camera-9\""), HasSubstr("with"));
+  EXPECT_THAT(refusalOf(when + "kind = \"frozen\"\ncount = 2"), HasSubstr("count"));
+  EXPECT_THAT(refusalOf(when + "kind = \"frozen\"\nblur_px = 2.0"), HasSubstr("defocused"));
+  EXPECT_THAT(refusalOf("force_N = 1.0\nkind = \"frozen\""), HasSubstr("force_N"));
 }
 
 TEST(FaultScript, WhatIsWrongIsNamed) {
@@ -194,7 +226,7 @@ TEST(FaultSchedule, RandomDelaysComeFromTheSeed) {
   one.run(2.0);
   other.run(2.0);
   EXPECT_EQ(one.times_s, other.times_s);
-  auto another = parseFaultScript("seed = 9\n" + script(keys), "s.toml", kAxes, true);
+  auto another = parseFaultScript("seed = 9\n" + script(keys), "s.toml", {kAxes, true});
   FaultSchedule schedule(*std::move(another));
   double begun_s = -1.0;
   for (double t = 0.0; t < 2.0; t += Play::kStep_s) {

@@ -50,20 +50,28 @@ struct SlowFault {
 struct AddedForceFault {
   double force_N;
 };
-using FaultKind =
-    std::variant<VirtualFault, UnplugFault, SlowFault, VirtualCellFault, AddedForceFault>;
+/// Of a camera; all of them last.
+struct CameraFault {
+  enum class Kind { kLostPackets, kUnplugged, kFrozen, kSaturated, kSwapped, kDefocused };
+  Kind kind = Kind::kFrozen;
+  double lost_share = 0.0;  ///< kLostPackets: of the packets, 0 to 1.
+  double blur_px = 0.0;     ///< kDefocused: one sigma.
+  int other = 0;            ///< kSwapped: the camera whose cable it has then.
+};
+using FaultKind = std::variant<VirtualFault, UnplugFault, SlowFault, VirtualCellFault,
+                               AddedForceFault, CameraFault>;
 
 struct ScriptedFault {
   std::string name;       ///< For the log and for `after`: "fault-1" unless given.
   std::string kind_name;  ///< As in the script.
-  int device = 0;         ///< Of the axes or of the cells, from 0.
-  bool on_axis = false;
+  int device = 0;         ///< Of the axes, the cells or the cameras, from 0.
+  bool on_axis = false, on_camera = false;  ///< Neither: of a cell.
   FaultKind kind;
   FaultTrigger trigger;
   int count = 0;                ///< Transfers or requests that it befalls; 0: until it ends.
   std::optional<double> for_s;  ///< Ends after that; without, what lasts stays.
 
-  std::string deviceName() const;  ///< "axis-3", "cell-5".
+  std::string deviceName() const;  ///< "axis-3", "cell-5", "camera-2".
 };
 
 /// Faults that `tenter twin serve --fault` plays; docs/formats/fault-script.md.
@@ -72,14 +80,20 @@ struct FaultScript {
   std::vector<ScriptedFault> faults;
 };
 
-/// Names that an axis' or a cell's `kind` may have.
+/// Names that an axis', a cell's or a camera's `kind` may have.
 std::vector<std::string> axisFaultNames();
 std::vector<std::string> cellFaultNames();
+std::vector<std::string> cameraFaultNames();
 
-/// The error names file, key and reason. `axes` and `tcp` are those of the rig it is for: Modbus
-/// TCP, for one, has no checksum to break.
-Result<FaultScript> readFaultScript(const std::filesystem::path& file, int axes, bool tcp);
-Result<FaultScript> parseFaultScript(std::string_view toml, const std::string& file, int axes,
-                                     bool tcp);
+/// The rig that a script is for. Modbus TCP, for one, has no checksum to break.
+struct FaultScriptRig {
+  int axes = 0;
+  bool tcp = true;
+  int cameras = 0;
+};
+/// The error names file, key and reason.
+Result<FaultScript> readFaultScript(const std::filesystem::path& file, const FaultScriptRig& rig);
+Result<FaultScript> parseFaultScript(std::string_view toml, const std::string& file,
+                                     const FaultScriptRig& rig);
 
 }  // namespace tenter

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tenter/core/result.h"
+#include "tenter/twin/sheet_shape.h"
 
 namespace tenter {
 
@@ -70,6 +71,8 @@ class MountedSpecimen {
   bool follow(const Positions& positions_m);
 
   const Moment& moment() const;
+  /// The sheet and its clips at that moment; nothing if no sample hangs on cords.
+  std::optional<SheetShape> shape() const;
   const Statistics& statistics() const;
   bool hasCord(int axis) const;
   /// Whether anything hangs on cords at all; otherwise the sample lies on the table.

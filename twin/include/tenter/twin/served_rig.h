@@ -5,11 +5,14 @@
 #include <atomic>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tenter/core/result.h"
 #include "tenter/twin/mounted_specimen.h"
+#include "tenter/twin/scene_renderer.h"
+#include "tenter/twin/virtual_cameras.h"
 #include "tenter/twin/virtual_modbus.h"
 #include "tenter/twin/virtual_usb.h"
 
@@ -19,6 +22,15 @@ struct ServedRigOptions {
   MountOptions mount;           ///< What hangs in it; the seed is also that of the cells' noise.
   std::filesystem::path state;  ///< Folder for rig.toml, the truth and, with RTU, the bus.
   bool tcp = true;
+  std::optional<VirtualCamerasOptions> cameras;  ///< Nothing: it has none.
+  /// Cameras that look at the sample: their number and size, and how it is rendered; in place of
+  /// `cameras`. Protocol, seeds and piece are those of `mount`.
+  struct Scene {
+    RigCameraOptions cameras;
+    RenderOptions render;
+    double calibration_error_px = 0.02;  ///< Of calibration.json in the state folder.
+  };
+  std::optional<Scene> scene;
 };
 
 class LiveSpecimen;
@@ -30,7 +42,9 @@ class ServedRig {
   static constexpr int kAxes = 8;
   static constexpr double kMetresPerMicrostep = 1e-6;
 
-  /// Writes `state`/rig.toml, mount.json and truth.jsonl, what hangs there and how it truly pulls.
+  /// Writes `state`/rig.toml, mount.json and truth.jsonl, what hangs there and how it truly pulls;
+  /// with a scene also mounting.json, calibration.json and images.jsonl, what each image truly
+  /// shows.
   /// Precondition: VirtualUsb::preload() has returned.
   static Result<std::unique_ptr<ServedRig>> start(const ServedRigOptions& options);
   ~ServedRig();
@@ -38,6 +52,7 @@ class ServedRig {
   ServedRig& operator=(const ServedRig&) = delete;
 
   VirtualUsb& usb() { return *usb_; }
+  VirtualCameras* cameras() { return cameras_.get(); }  ///< Null without any.
   VirtualCell& cell(int index) { return *cells_.at(static_cast<std::size_t>(index)); }
   std::filesystem::path configFile() const { return options_.state / "rig.toml"; }
   /// What the cord truly pulls at the clip or hook.
@@ -50,6 +65,7 @@ class ServedRig {
  private:
   ServedRig(ServedRigOptions options, std::unique_ptr<MountedSpecimen> specimen);
   Result<void> serve();
+  Result<void> serveCameras();
   void follow(int device, double position_m);
   std::string configuration() const;
 
@@ -61,6 +77,7 @@ class ServedRig {
   std::vector<std::shared_ptr<VirtualCell>> cells_;
   std::vector<std::unique_ptr<VirtualModbus>> servers_;
   std::unique_ptr<VirtualUsb> usb_;
+  std::unique_ptr<VirtualCameras> cameras_;
 };
 
 }  // namespace tenter

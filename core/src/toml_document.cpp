@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "tenter/rig/toml_document.h"
+#include "tenter/core/toml_document.h"
 
 #include <toml++/toml.h>
 
