@@ -36,7 +36,7 @@ std::shared_ptr<void> Recorder::expectFrames() {
   const std::lock_guard lock(mutex_);
   ++expected_;
   return {this, [](Recorder* recorder) {
-            const std::lock_guard lock(recorder->mutex_);
+            const std::lock_guard inner(recorder->mutex_);
             --recorder->expected_;
             recorder->changed_.notify_one();
           }};

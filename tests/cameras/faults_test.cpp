@@ -85,7 +85,9 @@ TEST_F(CameraFaults, LostPacketsHaveTheSetTakenAgain) {
       }
       retakes += set.retakes;
     }
-    if (share > 0.005) EXPECT_GT(retakes, 0);
+    if (share > 0.005) {
+      EXPECT_GT(retakes, 0);
+    }
   }
 }
 

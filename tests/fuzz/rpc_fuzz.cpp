@@ -119,7 +119,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static Daemon daemon;
   const std::string line = tamed({reinterpret_cast<const char*>(data), size});
   const tenter::daemon::Client client{1, "somebody"};
-  std::vector<Descriptor> attached;
+  std::vector<tenter::daemon::Descriptor> attached;
   const std::string answer = daemon.rpc->answer(line, client, attached);
   if (answer.empty()) {
     require(!Json::parse(line, nullptr, false).contains("id"),

@@ -108,7 +108,9 @@ TEST(DaemonCamerasTest, ARunRecordsWholeSetsInOrder) {
       const auto mark = markOf(session / frame.files[i].name);
       ASSERT_TRUE(mark) << frame.files[i].name;
       EXPECT_EQ(mark->camera, static_cast<int>(i));
-      if (k > 0) EXPECT_EQ(mark->frame, before[i] + step);
+      if (k > 0) {
+        EXPECT_EQ(mark->frame, before[i] + step);
+      }
       before[i] = mark->frame;
     }
   }
