@@ -93,6 +93,7 @@ TEST(TwinImagesTest, OptionsThatCannotBeAreUsage) {
   EXPECT_EQ(exitOf({"--boards", "2"}), 2);
   EXPECT_EQ(exitOf({"--session", "--boards", "10"}), 2);
   EXPECT_EQ(exitOf({"--session", "--fabric", "knit-12", "--calibration", "absent.json"}), 3);
+  EXPECT_EQ(exitOf({"--session", "--fabric", "knit-12", "--truth", "S/truth"}), 2);
   EXPECT_FALSE(std::filesystem::exists(folder / "S"));
 }
 

@@ -183,8 +183,9 @@ CameraCalibration calibrationOf(const std::vector<VirtualCamera>& cameras, const
     if (factor > 0.0) {
       camera.lens_sigma.assign(kLensErrors.begin(), kLensErrors.end());
       for (double& sigma : camera.lens_sigma) sigma *= factor;
-      camera.rotation_sigma_rad.setConstant(factor * kRotationError_rad);
-      camera.translation_sigma_m.setConstant(factor * kTranslationError_m);
+      const double moved = out.cameras.empty() ? 0.0 : factor;  // the first one is the world
+      camera.rotation_sigma_rad.setConstant(moved * kRotationError_rad);
+      camera.translation_sigma_m.setConstant(moved * kTranslationError_m);
     }
     out.cameras.push_back(std::move(camera));
   }
