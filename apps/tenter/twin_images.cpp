@@ -2,6 +2,7 @@
 #include "twin_images.h"
 
 #include <chrono>
+#include <filesystem>
 
 #include "interrupt.h"
 #include "output_guard.h"
@@ -16,6 +17,8 @@
 namespace tenter::app {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 RigCameraOptions camerasOf(const CaptureOptions& capture, const ImageOptions& o) {
   return {capture.protocol, o.cameras, o.width_px, capture.seed};
@@ -35,7 +38,12 @@ RenderOptions renderOf(const CaptureOptions& capture, const ImageOptions& o) {
 
 Result<void> checkTruthFolder(const std::string& truth, const std::string& output) {
   if (truth.empty()) return {};
-  if (truth == output) return usageError("--truth must be another folder than -o");
+  std::error_code failed;
+  const fs::path way =
+      fs::weakly_canonical(truth, failed).lexically_relative(fs::weakly_canonical(output, failed));
+  if (!way.empty() && *way.begin() != "..") {
+    return usageError("--truth must be a folder beside -o, not in it");
+  }
   return checkOutputFolder(truth, truthFolder());
 }
 

@@ -2,7 +2,6 @@
 #include "tenter/twin/image_session.h"
 
 #include <chrono>
-#include <cmath>
 #include <sstream>
 
 #include "random_numbers.h"
@@ -20,7 +19,6 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kFrameInterval_ns = 2'000'000'000;  // [Est12] sec. 3.1
-constexpr double kPixelPitch_m = 5.86e-6;                  // of a full-width sensor
 constexpr double kMaxCalibrationError_px = 5.0;
 
 double secondsSince(Clock::time_point begin) {
@@ -212,13 +210,12 @@ class SessionRun {
     const std::vector<ByteImage> pictures =
         renderer_->render(rests ? restShape() : moment.shape, static_cast<std::uint64_t>(number));
     std::vector<std::string> files;
-    for (const ByteImage& picture : pictures) {
-      const double full_width_px = 1936.0;
-      files.push_back(encodePng(picture, picture.width / (kPixelPitch_m * full_width_px)));
-    }
     std::vector<FrameImage> images;
-    for (std::size_t c = 0; c < files.size(); ++c) {
-      images.push_back({renderer_->cameras()[c].name, "png", files[c]});
+    files.reserve(pictures.size());
+    for (std::size_t c = 0; c < pictures.size(); ++c) {
+      const VirtualCamera& camera = renderer_->cameras()[c];
+      files.push_back(encodePng(pictures[c], camera.model.lens().fx_px / camera.focus_m));
+      images.push_back({camera.name, "png", files.back()});
     }
     auto added = writer_->addFrame(time_ns, images);
     return added ? Result<void>() : Result<void>(added.error());

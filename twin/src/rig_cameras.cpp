@@ -14,11 +14,11 @@ namespace {
 constexpr double kFullWidth_px = 1936.0, kFullHeight_px = 1216.0;
 constexpr double kFocal_px = 4266.0;  // 25 mm over 5.86 micrometres
 constexpr double kAperture_m = 0.025 / 16.0;
-constexpr double kDistance_m = 0.55;
+constexpr double kDistance_m = 0.58;
 constexpr double kRadian = std::numbers::pi / 180.0;
 constexpr double kElevation_rad = 58.0 * kRadian;
 // Of the table tests: from straight ahead of what hangs, low, to the sides, high.
-constexpr double kSideways_rad = 60.0 * kRadian;
+constexpr double kSideways_rad = 45.0 * kRadian;
 constexpr double kLow_rad = 36.0 * kRadian, kHigh_rad = 52.0 * kRadian;
 constexpr double kHangingPlace_m = 0.095, kHangingDepth_m = 0.025;
 
@@ -37,7 +37,7 @@ struct View {
 };
 
 View viewOf(const RigCameraOptions& o, bool hangs, int i) {
-  if (!hangs) return {(2.0 * i / o.count + 0.25) * std::numbers::pi, kElevation_rad};
+  if (!hangs) return {2.0 * i / o.count * std::numbers::pi, kElevation_rad};
   const double across = 2.0 * i / (o.count - 1) - 1.0;
   const double push = o.protocol == "bend-warp" ? 0.5 * std::numbers::pi : 0.0;
   return {push + kSideways_rad * across, kLow_rad + (kHigh_rad - kLow_rad) * std::abs(across)};
@@ -183,8 +183,9 @@ CameraCalibration calibrationOf(const std::vector<VirtualCamera>& cameras, const
     if (factor > 0.0) {
       camera.lens_sigma.assign(kLensErrors.begin(), kLensErrors.end());
       for (double& sigma : camera.lens_sigma) sigma *= factor;
-      camera.rotation_sigma_rad.setConstant(factor * kRotationError_rad);
-      camera.translation_sigma_m.setConstant(factor * kTranslationError_m);
+      const double moved = out.cameras.empty() ? 0.0 : factor;  // the first one is the world
+      camera.rotation_sigma_rad.setConstant(moved * kRotationError_rad);
+      camera.translation_sigma_m.setConstant(moved * kTranslationError_m);
     }
     out.cameras.push_back(std::move(camera));
   }

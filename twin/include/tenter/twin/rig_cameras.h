@@ -27,8 +27,8 @@ struct RigCameraOptions {
   std::uint64_t seed = 1;                 ///< Of how lenses and places differ from the drawing.
 };
 
-/// Cameras around and above the sample: 25 mm lenses at f/16 on sensors of 11.3 mm, half a metre
-/// off, 0.13 mm a pixel at full width. Each point of a taut sample is seen by all of them. Errors:
+/// Cameras around and above the sample: 25 mm lenses at f/16 on sensors of 11.3 mm, 0.58 m
+/// off, 0.136 mm a pixel at full width. Each point of a taut sample is seen by all of them. Errors:
 /// no such protocol, counts or sizes out of range.
 Result<std::vector<VirtualCamera>> rigCameras(const RigCameraOptions& options);
 
