@@ -14,9 +14,11 @@ namespace tenter {
 /// Points that are lost are looked for again from their neighbours and from their last place.
 class PointTracker {
  public:
-  /// Error if the options cannot be used or a point lies outside the image.
+  /// `centres` of the points' subsets where they are not the points themselves (SubsetMatcher);
+  /// empty, or one a point. Error if the options cannot be used or a point lies outside the image.
   static Result<PointTracker> create(const GrayImage& reference, std::vector<Vec2> points,
-                                     const CorrelateOptions& options);
+                                     const CorrelateOptions& options,
+                                     std::vector<Vec2> centres = {});
   PointTracker(PointTracker&&) noexcept;
   PointTracker& operator=(PointTracker&&) noexcept;
   ~PointTracker();

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "semi_global.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+
+#include "disparity_seeds.h"
+#include "rectified_pair.h"
+
+namespace tenter {
+
+namespace {
+
+constexpr int kBlock_px = 5;
+constexpr int kUniqueness_percent = 8;
+constexpr int kDisagreement_px = 1;
+constexpr int kSpeckle_px = 400, kSpeckleRange = 2;
+constexpr int kClip = 63;
+constexpr double kFixedPoint = 16.0;  ///< Disparities are sixteenths of a pixel.
+constexpr int kMaxDisparities = 512;
+
+cv::Mat residualDisparity(const cv::Mat& a, const cv::Mat& b, int least, int count) {
+  const int area = kBlock_px * kBlock_px;
+  const auto matcher = cv::StereoSGBM::create(
+      least, count, kBlock_px, 8 * area, 32 * area, kDisagreement_px, kClip, kUniqueness_percent,
+      kSpeckle_px, kSpeckleRange, cv::StereoSGBM::MODE_SGBM);
+  cv::Mat result;
+  matcher->compute(a, b, result);
+  return result;
+}
+
+}  // namespace
+
+Result<std::vector<SeenPoint>> semiGlobalPoints(const CameraView& a, const cv::Mat& image_a,
+                                                const CameraView& b, const cv::Mat& image_b,
+                                                int step_px) {
+  const std::string names = "'" + a.name + "' and '" + b.name + "'";
+  const auto pair = RectifiedPair::make(a, b);
+  if (!pair) {
+    return badInput("", "", "cameras " + names + " do not look at a common place",
+                    "is the calibration that of these cameras?");
+  }
+  const cv::Mat rectified_a = pair->imageA(image_a), mask = pair->maskA();
+  const auto plane =
+      findDisparityPlane(rectified_a, mask, pair->imageB(image_b),
+                         std::max(1.0 - pair->widthB(), 1.0 - pair->disparityOffset()),
+                         pair->widthA());
+  if (!plane) {
+    return badInput("", "",
+                    "cameras " + names + " show no common texture where the calibration says",
+                    "are images or cameras exchanged, or is the calibration another rig's?");
+  }
+  const cv::Mat over_a = pair->imageBOverA(image_b, plane->plane);
+  const int least = static_cast<int>(std::floor(plane->least_px));
+  const int wanted = static_cast<int>(std::ceil(plane->most_px)) - least;
+  const int count = std::min((wanted / 16 + 1) * 16, kMaxDisparities);
+  const cv::Mat disparity = residualDisparity(rectified_a, over_a, least, count);
+  std::vector<SeenPoint> points;
+  for (int y = 0; y < disparity.rows; y += step_px) {
+    for (int x = 0; x < disparity.cols; x += step_px) {
+      const auto value = disparity.at<short>(y, x);
+      if (value < least * kFixedPoint || mask.at<uchar>(y, x) == 0) continue;
+      const double column = x - value / kFixedPoint;
+      const double b_column = column - (plane->plane.x() * column + plane->plane.y() * y + plane->plane.z());
+      const double whole = x - b_column + pair->disparityOffset();
+      const auto pixel = pair->pixelA(x, y);
+      if (!(whole > 0.0) || !pixel) continue;
+      points.push_back({pair->point(x, y, x - b_column), *pixel});
+    }
+  }
+  return points;
+}
+
+}  // namespace tenter
