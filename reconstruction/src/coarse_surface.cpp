@@ -26,7 +26,8 @@ struct Pair {
 
 /// Angle under which a point well before both cameras sees them.
 double angleBetween(const CameraView& a, const CameraView& b) {
-  const Vec3 ahead_a = a.camera_from_space.linear().row(2), ahead_b = b.camera_from_space.linear().row(2);
+  const Vec3 ahead_a = a.camera_from_space.linear().row(2),
+             ahead_b = b.camera_from_space.linear().row(2);
   return std::acos(std::clamp(ahead_a.dot(ahead_b), -1.0, 1.0));
 }
 
@@ -87,12 +88,14 @@ Result<CoarseCloud> coarseCloud(const std::vector<CameraView>& views,
   }
   CoarseCloud cloud;
   std::vector<double> pixel_sizes;
-  Error last = badInput("", "", "no two cameras look at one place from directions less than 75 "
-                        "degrees apart", "is the calibration that of these cameras?");
+  Error last = badInput("", "",
+                        "no two cameras look at one place from directions less than 75 "
+                        "degrees apart",
+                        "is the calibration that of these cameras?");
   for (const Pair& pair : choosePairs(views, images)) {
     if (keep_going && !keep_going()) return notConverged("stopped by the user");
-    const auto points = semiGlobalPoints(views[pair.a], pixels[pair.a], views[pair.b],
-                                         pixels[pair.b], kStep_px);
+    const auto points =
+        semiGlobalPoints(views[pair.a], pixels[pair.a], views[pair.b], pixels[pair.b], kStep_px);
     if (points) {
       addPoints(*points, views[pair.a], cloud, pixel_sizes);
     } else {

@@ -91,8 +91,8 @@ cv::Mat RectifiedPair::lookUp(const CameraView& view, const cv::Mat& pixels, dou
     auto* row = map.ptr<cv::Vec2f>(y);
     for (int x = 0; x < width; ++x) {
       const double moved = x + x0 - (plane.x() * x + plane.y() * y + plane.z());
-      const auto pixel = view.model.project(camera_from_rectified *
-                                            Vec3(moved, y + y0_, focal_px_));
+      const auto pixel =
+          view.model.project(camera_from_rectified * Vec3(moved, y + y0_, focal_px_));
       row[x] = pixel ? cv::Vec2f(static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
                      : cv::Vec2f(-1e4F, -1e4F);
     }

@@ -42,10 +42,9 @@ Result<std::vector<SeenPoint>> semiGlobalPoints(const CameraView& a, const cv::M
                     "is the calibration that of these cameras?");
   }
   const cv::Mat rectified_a = pair->imageA(image_a), mask = pair->maskA();
-  const auto plane =
-      findDisparityPlane(rectified_a, mask, pair->imageB(image_b),
-                         std::max(1.0 - pair->widthB(), 1.0 - pair->disparityOffset()),
-                         pair->widthA());
+  const auto plane = findDisparityPlane(
+      rectified_a, mask, pair->imageB(image_b),
+      std::max(1.0 - pair->widthB(), 1.0 - pair->disparityOffset()), pair->widthA());
   if (!plane) {
     return badInput("", "",
                     "cameras " + names + " show no common texture where the calibration says",
@@ -62,7 +61,8 @@ Result<std::vector<SeenPoint>> semiGlobalPoints(const CameraView& a, const cv::M
       const auto value = disparity.at<short>(y, x);
       if (value < least * kFixedPoint || mask.at<uchar>(y, x) == 0) continue;
       const double column = x - value / kFixedPoint;
-      const double b_column = column - (plane->plane.x() * column + plane->plane.y() * y + plane->plane.z());
+      const double b_column =
+          column - (plane->plane.x() * column + plane->plane.y() * y + plane->plane.z());
       const double whole = x - b_column + pair->disparityOffset();
       const auto pixel = pair->pixelA(x, y);
       if (!(whole > 0.0) || !pixel) continue;

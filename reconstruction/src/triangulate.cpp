@@ -88,8 +88,7 @@ std::optional<SpacePoint> triangulate(std::span<const CameraView> views,
     if (step.norm() > kSmallStep_m) continue;
     point.covariance_m2 = factor.solve(Mat3::Identity());
     point.chi2 = normal->chi2;
-    point.residual_px =
-        std::sqrt(normal->squares_px2 / static_cast<double>(sightings.size()));
+    point.residual_px = std::sqrt(normal->squares_px2 / static_cast<double>(sightings.size()));
     point.worst = normal->worst_sighting;
     return point;
   }

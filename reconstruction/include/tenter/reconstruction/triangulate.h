@@ -26,9 +26,9 @@ struct SpacePoint {
 };
 
 /// The point nearest to all sightings in the sense of their covariances: Gauss-Newton on the
-/// distances in the images, lens included, from `guess` or from where the rays pass nearest. Nothing
-/// if there are fewer than two sightings, the rays are parallel, or a view cannot see the point.
-/// Never allocates.
+/// distances in the images, lens included, from `guess` or from where the rays pass nearest.
+/// Nothing if there are fewer than two sightings, the rays are parallel, or a view cannot see the
+/// point. Never allocates.
 std::optional<SpacePoint> triangulate(std::span<const CameraView> views,
                                       std::span<const Sighting> sightings,
                                       const Vec3* guess = nullptr);
