@@ -12,6 +12,7 @@
 #include "tenter/calib/image_sequence.h"
 #include "tenter/core/measurement_folder.h"
 #include "tenter/reconstruction/reconstruct_images.h"
+#include "tenter/reconstruction/reconstruct_session.h"
 #include "verbs.h"
 
 namespace tenter::app {
@@ -205,6 +206,35 @@ void summarise(const Measurement& m, const std::vector<FrameQuality>& quality,
   for (const std::string& warning : warnings) console.warn(warning);
 }
 
+/// Beside the measurement: where frames are kept until all of them are done.
+std::filesystem::path partialFolder(const Options& o) {
+  std::filesystem::path folder = std::filesystem::path(o.output).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  folder += ".partial";
+  return folder;
+}
+
+bool show(Progress& progress, int done, int count) {
+  progress.show(static_cast<double>(done) / count,
+                "frame " + std::to_string(done) + " of " + std::to_string(count));
+  return !interrupted();
+}
+
+/// Writes the measurement and says what it is worth.
+Result<int> finish(SeriesResult& result, const Options& o, Console& console) {
+  for (const FrameQuality& frame : result.quality) {
+    for (const std::string& warning : frame.warnings) {
+      result.warnings.push_back("frame " + std::to_string(frame.number) + ": " + warning);
+    }
+  }
+  if (auto done = writeMeasurement(o.output, result.measurement); !done) return done.error();
+  summarise(result.measurement, result.quality, result.warnings, console);
+  if (result.stopped) {
+    return notConverged("stopped by the user", "the frames so far were written");
+  }
+  return kDone;
+}
+
 Result<int> runImages(const Options& o, Console& console) {
   if (o.calibration.empty()) return usageError("--images needs --calibration");
   const auto roi = parseRoi(o.roi);
@@ -226,11 +256,7 @@ Result<int> runImages(const Options& o, Console& console) {
              (pixel.array() <= region.most.array()).all();
     };
   }
-  options.keep_going = [&](int done, int count) {
-    progress.show(static_cast<double>(done) / count,
-                  "frame " + std::to_string(done) + " of " + std::to_string(count));
-    return !interrupted();
-  };
+  options.keep_going = [&](int done, int count) { return show(progress, done, count); };
   auto result = reconstructImages(views, *sets, options);
   if (!result) return result.error().file.empty() ? result.error().in(o.images) : result.error();
   Measurement& m = result->measurement;
@@ -250,17 +276,22 @@ Result<int> runImages(const Options& o, Console& console) {
     result->warnings.push_back(
         "--areal-density-kg-per-m2 was not given: 0.2 kg/m^2 stands in for it");
   }
-  for (const FrameQuality& frame : result->quality) {
-    for (const std::string& warning : frame.warnings) {
-      result->warnings.push_back("frame " + std::to_string(frame.number) + ": " + warning);
-    }
-  }
-  if (auto done = writeMeasurement(o.output, m); !done) return done.error();
-  summarise(m, result->quality, result->warnings, console);
-  if (result->stopped) {
-    return notConverged("stopped by the user", "the frames so far were written");
-  }
-  return kDone;
+  return finish(*result, o, console);
+}
+
+Result<int> runSession(const Options& o, Console& console) {
+  const auto session = openImageSession(o.session);
+  if (!session) return session.error();
+  Progress progress(console);
+  SessionReconstruction options;
+  options.surface = surfaceOptions(o);
+  options.partial = partialFolder(o);
+  options.keep_going = [&](int done, int count) { return show(progress, done, count); };
+  auto result = reconstructSession(*session, options);
+  if (!result) return result.error();
+  result->warnings.insert(result->warnings.begin(), session->warnings.begin(),
+                          session->warnings.end());
+  return finish(*result, o, console);
 }
 
 Result<int> run(const Options& o, Console& console) {
@@ -271,7 +302,7 @@ Result<int> run(const Options& o, Console& console) {
     return usable.error();
   }
   if (auto free = checkOutputFolder(o.output, measurementFolder()); !free) return free.error();
-  return runImages(o, console);
+  return o.session.empty() ? runImages(o, console) : runSession(o, console);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "carried_warp.h"
 #include "displacement_fill.h"
 #include "parallel_for.h"
 
@@ -33,6 +34,7 @@ struct ClothTracker::State {
   std::vector<std::vector<Vec2>> rest_residuals;  ///< Of each sighting of each vertex [px].
   Points3 last;
   DisplacementFill fill;
+  CarriedWarp carried;
 
   State(const std::vector<CameraView>& seen_by, const RestSurface& rest,
         const SurfaceOptions& wanted)
@@ -40,7 +42,7 @@ struct ClothTracker::State {
         surface(rest),
         options(wanted),
         last(rest.mesh.positions),
-        fill(rest.mesh) {}
+        fill(rest.mesh), carried(rest.mesh) {}
 
   Result<void> prepare(const std::vector<GrayImage>& images);
   void locate(int vertex, std::vector<Sighting>& seen, std::vector<std::size_t>& places,
@@ -130,7 +132,8 @@ Result<ClothTracker> ClothTracker::create(const std::vector<CameraView>& views,
   return ClothTracker(std::move(state));
 }
 
-Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images) {
+Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
+                                       const std::vector<KnownVertex>& known) {
   State& s = *state_;
   const std::size_t count = s.surface.vertices.size();
   std::vector<std::vector<Sighting>> seen(count);
@@ -174,9 +177,28 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images) {
   parallelFor(count, s.options.correlate.threads, [&](std::size_t i, std::size_t) {
     s.locate(static_cast<int>(i), seen[i], places[i], frame);
   });
+  for (const KnownVertex& vertex : known) {
+    frame.positions_m.col(vertex.vertex) = vertex.position_m;
+    frame.covariances_m2[vertex.vertex] = vertex.covariance_m2;
+    frame.states[vertex.vertex] = PointState::kValid;
+  }
   frame.filled_m = s.fill.complete(frame, s.last);
   s.last = frame.positions_m;
   return frame;
+}
+
+void ClothTracker::goOnFrom(const ClothFrame& frame, const std::vector<GrayImage>& images) {
+  State& s = *state_;
+  s.last = frame.positions_m;
+  for (std::size_t v = 0; v < s.views.size(); ++v) {
+    TrackedView& view = s.tracked[v];
+    if (!view.tracker || images[v].width == 0) continue;
+    std::vector<SubsetWarp> warps;
+    for (const int vertex : view.vertices) {
+      warps.push_back(s.carried.of(vertex, frame.positions_m, s.views[v]));
+    }
+    view.tracker->goOnFrom(images[v], std::move(warps));
+  }
 }
 
 std::size_t ClothFrame::validCount() const {

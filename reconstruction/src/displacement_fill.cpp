@@ -4,21 +4,12 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 
+#include "carried_warp.h"
+
 namespace tenter {
 
 DisplacementFill::DisplacementFill(const TriangleMesh& rest)
-    : rest_(rest.positions), neighbours_(static_cast<std::size_t>(rest.vertexCount())) {
-  for (const Triangle& triangle : rest.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      neighbours_[triangle[k]].push_back(triangle[(k + 1) % 3]);
-      neighbours_[triangle[k]].push_back(triangle[(k + 2) % 3]);
-    }
-  }
-  for (auto& list : neighbours_) {
-    std::sort(list.begin(), list.end());
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-  }
-}
+    : rest_(rest.positions), neighbours_(vertexNeighbours(rest)) {}
 
 double DisplacementFill::complete(ClothFrame& frame, const Points3& last) const {
   std::vector<int> row(frame.states.size(), -1), unknown;

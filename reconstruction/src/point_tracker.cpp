@@ -195,4 +195,12 @@ Result<CorrelationField> PointTracker::track(const GrayImage& image) {
   return field;
 }
 
+void PointTracker::goOnFrom(const GrayImage& image, std::vector<SubsetWarp> warps) {
+  const GrayImage& first = state_->reference.image();
+  require(image.width == first.width && image.height == first.height, "images of one size");
+  require(warps.size() == state_->points.size(), "one warp a point");
+  state_->previous = eightBits(image);
+  state_->last = std::move(warps);
+}
+
 }  // namespace tenter

@@ -80,6 +80,21 @@ MeasurementFrame measuredFrame(const ClothFrame& cloth, std::int64_t time_ns) {
   return frame;
 }
 
+void VertexMaps::add(const ClothFrame& cloth) {
+  const std::size_t count = cloth.states.size();
+  ++frames;
+  valid.resize(count);
+  for (auto* sums : {&zncc, &residual_px, &sigma_m}) sums->resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    // A vertex that a clip holds is not seen.
+    if (cloth.states[i] != PointState::kValid || cloth.views[i] == 0) continue;
+    ++valid[i];
+    zncc[i] += cloth.zncc[i];
+    residual_px[i] += cloth.residual_px[i];
+    sigma_m[i] += sigmaOf(cloth.covariances_m2[i]);
+  }
+}
+
 FrameQuality qualityOf(const ClothFrame& cloth) {
   FrameQuality quality;
   quality.states.resize(kPointStates);
@@ -131,6 +146,7 @@ Result<SeriesResult> reconstructImages(const std::vector<CameraView>& views,
     quality.time_ns = set.time_ns;
     quality.seconds = seconds(begin);
     result.quality.push_back(std::move(quality));
+    result.maps.add(cloth);
     result.measurement.frames.push_back(measuredFrame(cloth, set.time_ns));
     begin = Clock::now();
   };

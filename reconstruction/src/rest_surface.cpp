@@ -8,6 +8,7 @@
 #include "grid_mesh.h"
 #include "parallel_for.h"
 #include "sheet_heights.h"
+#include "subset_centres.h"
 #include "view_matcher.h"
 
 namespace tenter {
@@ -18,9 +19,6 @@ namespace {
 constexpr double kCell_px = 4.0;
 /// Passes of matching: the first from the coarse surface, the last on the exact nodes.
 constexpr int kPasses = 2;
-/// How far a subset is moved, in halves of a subset, to lie where the cloth can be seen.
-constexpr double kFarthestMove = 2.5;
-constexpr int kMoveSteps = 10;
 /// Places tried for texture that occurs again, each way, and the correlation that counts.
 constexpr int kRepeatPlaces = 3;
 constexpr double kRepeats = 0.85;
@@ -42,32 +40,11 @@ double medianOf(std::vector<double> values) {
   return *middle;
 }
 
-bool squareFree(const SheetGrid& grid, const Vec2& middle, double half_m) {
-  for (int i = -1; i <= 1; ++i) {
-    for (int j = -1; j <= 1; ++j) {
-      if (!grid.free(middle + half_m * Vec2(i, j))) return false;
-    }
-  }
-  return true;
-}
-
 /// The place nearest to a node around which a subset sees nothing but cloth.
 std::optional<Vec2> subsetPlace(const SheetGrid& grid, const Vec2& place, double half_m) {
-  if (squareFree(grid, place, half_m)) return place;
-  if (!grid.to_the_edge) return std::nullopt;
-  std::optional<Vec2> best;
-  double best_distance = 1e300;
-  const double step = kFarthestMove * half_m / kMoveSteps;
-  for (int i = -kMoveSteps; i <= kMoveSteps; ++i) {
-    for (int j = -kMoveSteps; j <= kMoveSteps; ++j) {
-      const Vec2 moved = place + step * Vec2(i, j);
-      const double distance = step * std::hypot(i, j);
-      if (distance >= best_distance || !squareFree(grid, moved, half_m)) continue;
-      best = moved;
-      best_distance = distance;
-    }
-  }
-  return best;
+  const auto free = freeSquare(place, half_m, grid.free);
+  if (free && *free != place && !grid.to_the_edge) return std::nullopt;
+  return free;
 }
 
 void matchNodes(const SheetGrid& grid, const SheetHeights& heights, const ViewMatcher& matcher,
@@ -82,7 +59,7 @@ void matchNodes(const SheetGrid& grid, const SheetHeights& heights, const ViewMa
     const double half_m = matcher.halfSubset_m(element);
     vertices[i].state = PointState::kOutside;
     if (!(half_m > 0.0)) return;
-    const auto middle = subsetPlace(grid, grid.place(node), half_m);
+    const auto middle = subsetPlace(grid, grid.place(node), half_m + grid.margin_m);
     if (!middle || !heights.known(heights.nodeNear(*middle))) return;
     vertices[i] = matcher.match(element, heights.elementAt(*middle), scratch[worker]);
   });
@@ -220,6 +197,7 @@ Result<RestSurface> findSurface(const std::vector<CameraView>& views,
   grid.spacing_m = Vec2::Constant(spacing);
   grid.columns = static_cast<int>(extent.x() / spacing + 1e-9) + 1;
   grid.rows = static_cast<int>(extent.y() / spacing + 1e-9) + 1;
+  grid.margin_m = coarse.cell_m();
   grid.free = [&coarse](const Vec2& place) { return coarse.knows(place); };
   grid.uv = [&grid](const Vec2& place) -> Vec2 { return place - grid.origin_m; };
   auto surface = surfaceOn(views, images, options, grid, coarse, cloud->pixel_m);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "disparity_seeds.h"
 #include "rectified_pair.h"
@@ -19,6 +20,10 @@ constexpr int kSpeckle_px = 400, kSpeckleRange = 2;
 constexpr int kClip = 63;
 constexpr double kFixedPoint = 16.0;  ///< Disparities are sixteenths of a pixel.
 constexpr int kMaxDisparities = 512;
+/// Where an image varies less than this share of its median, semi-global matching only carries on
+/// what it found beside it.
+constexpr double kLeastTexture = 0.35;
+constexpr int kTextureWindow_px = 7;
 
 cv::Mat residualDisparity(const cv::Mat& a, const cv::Mat& b, int least, int count) {
   const int area = kBlock_px * kBlock_px;
@@ -28,6 +33,32 @@ cv::Mat residualDisparity(const cv::Mat& a, const cv::Mat& b, int least, int cou
   cv::Mat result;
   matcher->compute(a, b, result);
   return result;
+}
+
+/// Standard deviation of grey levels around each pixel.
+cv::Mat deviationMap(const cv::Mat& image) {
+  cv::Mat values, mean, squares;
+  image.convertTo(values, CV_32F);
+  const cv::Size window(kTextureWindow_px, kTextureWindow_px);
+  cv::boxFilter(values, mean, CV_32F, window);
+  cv::sqrBoxFilter(values, squares, CV_32F, window);
+  cv::Mat variance = cv::max(squares - mean.mul(mean), 0.0);
+  cv::sqrt(variance, variance);
+  return variance;
+}
+
+/// Of the places that have a disparity.
+double medianDeviation(const cv::Mat& deviations, const cv::Mat& disparity, int least) {
+  std::vector<float> values;
+  for (int y = 0; y < disparity.rows; ++y) {
+    for (int x = 0; x < disparity.cols; ++x) {
+      if (disparity.at<short>(y, x) >= least) values.push_back(deviations.at<float>(y, x));
+    }
+  }
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 }  // namespace
@@ -55,11 +86,15 @@ Result<std::vector<SeenPoint>> semiGlobalPoints(const CameraView& a, const cv::M
   const int wanted = static_cast<int>(std::ceil(plane->most_px)) - least;
   const int count = std::min((wanted / 16 + 1) * 16, kMaxDisparities);
   const cv::Mat disparity = residualDisparity(rectified_a, over_a, least, count);
+  const int least_fixed = least * static_cast<int>(kFixedPoint);
+  const cv::Mat deviations = deviationMap(rectified_a);
+  const double texture = kLeastTexture * medianDeviation(deviations, disparity, least_fixed);
   std::vector<SeenPoint> points;
   for (int y = 0; y < disparity.rows; y += step_px) {
     for (int x = 0; x < disparity.cols; x += step_px) {
       const auto value = disparity.at<short>(y, x);
-      if (value < least * kFixedPoint || mask.at<uchar>(y, x) == 0) continue;
+      if (value < least_fixed || mask.at<uchar>(y, x) == 0) continue;
+      if (deviations.at<float>(y, x) < texture) continue;
       const double column = x - value / kFixedPoint;
       const double b_column =
           column - (plane->plane.x() * column + plane->plane.y() * y + plane->plane.z());

@@ -24,6 +24,13 @@ struct ClothFrame {
   std::size_t validCount() const;
 };
 
+/// A vertex whose place is known otherwise: a clip holds it.
+struct KnownVertex {
+  int vertex = 0;
+  Vec3 position_m = Vec3::Zero();
+  Mat3 covariance_m2 = Mat3::Zero();
+};
+
 /// The frame at rest in the same form.
 ClothFrame restFrame(const RestSurface& surface);
 
@@ -39,9 +46,15 @@ class ClothTracker {
   ClothTracker& operator=(ClothTracker&&) noexcept;
   ~ClothTracker();
 
-  /// The cloth in the next images, one a view; an empty one is missing. Error, with the view's name
-  /// as place: an image of another size or depth.
-  Result<ClothFrame> track(const std::vector<GrayImage>& images);
+  /// The cloth in the next images, one a view; an empty one is missing. Known vertices are valid
+  /// and lie where they are said to. Error, with the view's name as place: an image of another size
+  /// or depth.
+  Result<ClothFrame> track(const std::vector<GrayImage>& images,
+                           const std::vector<KnownVertex>& known = {});
+
+  /// Goes on after a frame that was found before; `images` are those it was found in. What follows
+  /// is what it would have been, to the tolerance of a match.
+  void goOnFrom(const ClothFrame& frame, const std::vector<GrayImage>& images);
 
  private:
   struct State;

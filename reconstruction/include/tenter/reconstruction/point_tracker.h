@@ -27,6 +27,10 @@ class PointTracker {
   /// the image has another size or depth than the first; the tracker is then as before.
   Result<CorrelationField> track(const GrayImage& image);
 
+  /// Goes on as if the last image tracked had been this one with the points moved so (one warp a
+  /// point, around it). Precondition: the image has the size of the first.
+  void goOnFrom(const GrayImage& image, std::vector<SubsetWarp> warps);
+
  private:
   struct State;
   explicit PointTracker(std::unique_ptr<State> state);

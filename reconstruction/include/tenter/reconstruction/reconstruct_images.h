@@ -32,6 +32,16 @@ struct FrameQuality {
   std::vector<std::string> warnings;
 };
 
+/// How well each vertex was seen, over all frames.
+struct VertexMaps {
+  int frames = 0;
+  std::vector<int> valid;  ///< In how many frames.
+  /// Sums over those.
+  std::vector<double> zncc, residual_px, sigma_m;
+
+  void add(const ClothFrame& cloth);
+};
+
 /// Images to follow cloth through, and how.
 struct SeriesOptions {
   SurfaceOptions surface;
@@ -46,6 +56,7 @@ struct SeriesResult {
   Measurement measurement;
   RestSurface rest;
   std::vector<FrameQuality> quality;  ///< One a frame of the measurement.
+  VertexMaps maps;
   std::vector<std::string> warnings;
   bool stopped = false;  ///< Frames after the last one were not looked at.
 };

@@ -53,6 +53,7 @@ struct SheetGrid {
   int columns = 0, rows = 0;
   /// Whether the cloth can be seen at a place of the sheet [m]: subsets stay where it can.
   std::function<bool(const Vec2&)> free;
+  double margin_m = 0.0;  ///< How much `free` may err outwards.
   /// Whether subsets of vertices near what is not free are moved to where all is free; otherwise
   /// such vertices are left out.
   bool to_the_edge = false;
