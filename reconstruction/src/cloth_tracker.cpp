@@ -42,7 +42,8 @@ struct ClothTracker::State {
         surface(rest),
         options(wanted),
         last(rest.mesh.positions),
-        fill(rest.mesh), carried(rest.mesh) {}
+        fill(rest.mesh),
+        carried(rest.mesh) {}
 
   Result<void> prepare(const std::vector<GrayImage>& images);
   void locate(int vertex, std::vector<Sighting>& seen, std::vector<std::size_t>& places,

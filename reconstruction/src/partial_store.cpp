@@ -40,7 +40,8 @@ std::vector<double> numbersOf(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
 
 Json clipJson(const ClipReading& clip) {
   std::vector<double> outline;
-  for (const Vec2& corner : clip.outline_uv_m) outline.insert(outline.end(), {corner.x(), corner.y()});
+  for (const Vec2& corner : clip.outline_uv_m)
+    outline.insert(outline.end(), {corner.x(), corner.y()});
   return {{"clip", clip.clip},
           {"pose", numbersOf(clip.rig_from_clip.matrix())},
           {"vertices", clip.clamped_vertices},

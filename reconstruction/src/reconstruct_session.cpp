@@ -29,9 +29,10 @@ std::string identityOf(const ImageSession& session, const SessionReconstruction&
   const CorrelateOptions& c = o.surface.correlate;
   std::ostringstream text;
   text.precision(17);
-  text << session.identity << '\n' << c.match.subset_px << ' ' << c.match.order << ' ' << c.min_zncc
-       << ' ' << c.max_sigma_px << ' ' << o.surface.max_residual_px << ' '
-       << o.surface.vertices_per_side << ' ' << o.tension.cell_N << ' ' << o.tension.friction_N;
+  text << session.identity << '\n'
+       << c.match.subset_px << ' ' << c.match.order << ' ' << c.min_zncc << ' ' << c.max_sigma_px
+       << ' ' << o.surface.max_residual_px << ' ' << o.surface.vertices_per_side << ' '
+       << o.tension.cell_N << ' ' << o.tension.friction_N;
   return text.str();
 }
 
@@ -162,7 +163,8 @@ class SessionRun {
     rig_->addTable(*cloth, *reading);
     FinishedFrame finished;
     finished.frame.time_ns = moment.time_ns;
-    finished.frame.branch = rig_->branchBetween(index > 0 ? &s_.moments[index - 1] : nullptr, moment);
+    finished.frame.branch =
+        rig_->branchBetween(index > 0 ? &s_.moments[index - 1] : nullptr, moment);
     finished.frame.clips = std::move(reading->clips);
     finished.frame.cords = std::move(reading->cords);
     finished.cloth = std::move(*cloth);

@@ -9,6 +9,7 @@
 #include "parallel_for.h"
 #include "sheet_heights.h"
 #include "subset_centres.h"
+#include "surface_warp.h"
 #include "view_matcher.h"
 
 namespace tenter {
@@ -143,6 +144,7 @@ Result<RestSurface> surfaceOn(const std::vector<CameraView>& views,
     matchNodes(grid, heights, matcher, options, vertices);
     heights.refine(vertices, pixel_m);
   }
+  SurfaceWarp(views, images, options, grid, heights).refine(vertices);
   settleOnNodes(views, grid, heights, vertices);
   auto surface = meshOnGrid(grid, heights, std::move(vertices));
   if (!surface) return surface;

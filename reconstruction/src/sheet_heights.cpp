@@ -62,6 +62,19 @@ Vec2 SheetHeights::slope(int node) const {
           along(row, grid_.rows, grid_.columns, grid_.spacing_m.y())};
 }
 
+double SheetHeights::extrapolated(int column, int row) const {
+  if (column < 0) return 2.0 * extrapolated(0, row) - extrapolated(1, row);
+  if (row < 0) return 2.0 * extrapolated(column, 0) - extrapolated(column, 1);
+  const int last_column = grid_.columns - 1, last_row = grid_.rows - 1;
+  if (column > last_column) {
+    return 2.0 * extrapolated(last_column, row) - extrapolated(last_column - 1, row);
+  }
+  if (row > last_row) {
+    return 2.0 * extrapolated(column, last_row) - extrapolated(column, last_row - 1);
+  }
+  return heights_[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid_.columns) + column];
+}
+
 int SheetHeights::nodeNear(const Vec2& place_m) const {
   const Vec2 cell = (place_m - grid_.origin_m).cwiseQuotient(grid_.spacing_m);
   const int column = std::clamp(static_cast<int>(std::lround(cell.x())), 0, grid_.columns - 1);

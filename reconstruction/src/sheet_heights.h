@@ -22,6 +22,8 @@ class SheetHeights {
   /// The surface at a node, and at any place near one. Precondition: the (nearest) node is known.
   SurfaceElement element(int node) const { return elementAt(grid_.place(node)); }
   SurfaceElement elementAt(const Vec2& place_m) const;
+  /// Height at the node of a column and row; beyond the border, as its outermost two go on.
+  double extrapolated(int column, int row) const;
   /// Nearest node of a place.
   int nodeNear(const Vec2& place_m) const;
 
