@@ -10,7 +10,9 @@
 #include "output_guard.h"
 #include "progress.h"
 #include "tenter/calib/image_sequence.h"
+#include "tenter/core/files.h"
 #include "tenter/core/measurement_folder.h"
+#include "tenter/reconstruction/quality_report.h"
 #include "tenter/reconstruction/reconstruct_images.h"
 #include "tenter/reconstruction/reconstruct_session.h"
 #include "verbs.h"
@@ -24,7 +26,7 @@ constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 constexpr double kUnknownDensity_kg_per_m2 = 0.2;
 
 struct Options {
-  std::string session, images, calibration, roi, output, fabric, specimen;
+  std::string session, images, calibration, roi, output, report, fabric, specimen;
   std::vector<std::string> cameras;
   int subset_px = 31, order = 2, vertices = 100, threads = 0;
   double min_zncc = 0.75, max_sigma_px = 0.1, max_residual_px = 0.5;
@@ -65,6 +67,7 @@ void declare(CLI::App& command, Options& o) {
                   "Mass of a square metre, with --images")
       ->check(CLI::Range(0.005, 5.0));
   command.add_option("--threads", o.threads, "0: one a core")->check(CLI::Range(0, 256));
+  command.add_option("--report", o.report, "Page to write on how good it is (HTML)");
   command.add_option("-o,--output", o.output, "Measurement to write (folder)")->required();
 }
 
@@ -221,13 +224,18 @@ bool show(Progress& progress, int done, int count) {
 }
 
 /// Writes the measurement and says what it is worth.
-Result<int> finish(SeriesResult& result, const Options& o, Console& console) {
+Result<int> finish(SeriesResult& result, const CameraView& view, const FrameImageReader& image,
+                   const Options& o, Console& console) {
   for (const FrameQuality& frame : result.quality) {
     for (const std::string& warning : frame.warnings) {
       result.warnings.push_back("frame " + std::to_string(frame.number) + ": " + warning);
     }
   }
   if (auto done = writeMeasurement(o.output, result.measurement); !done) return done.error();
+  if (!o.report.empty()) {
+    const std::string page = qualityReport(result, view, image);
+    if (auto done = writeFileAtomically(o.report, page); !done) return done.error();
+  }
   summarise(result.measurement, result.quality, result.warnings, console);
   if (result.stopped) {
     return notConverged("stopped by the user", "the frames so far were written");
@@ -276,7 +284,12 @@ Result<int> runImages(const Options& o, Console& console) {
     result->warnings.push_back(
         "--areal-density-kg-per-m2 was not given: 0.2 kg/m^2 stands in for it");
   }
-  return finish(*result, o, console);
+  const auto image = [&](std::size_t frame) -> GrayImage {
+    const auto& file = (*sets)[frame].files.front();
+    auto read = file.empty() ? Result<ImageFile>(ImageFile{}) : readGrayImage(file);
+    return read ? std::move(read->image) : GrayImage{};
+  };
+  return finish(*result, views.front(), image, o, console);
 }
 
 Result<int> runSession(const Options& o, Console& console) {
@@ -291,7 +304,14 @@ Result<int> runSession(const Options& o, Console& console) {
   if (!result) return result.error();
   result->warnings.insert(result->warnings.begin(), session->warnings.begin(),
                           session->warnings.end());
-  return finish(*result, o, console);
+  const auto image = [&](std::size_t frame) -> GrayImage {
+    const int number = result->quality[frame].number;
+    const auto moment = std::find_if(session->moments.begin(), session->moments.end(),
+                                     [&](const SessionMoment& m) { return m.frame == number; });
+    std::vector<std::string> unread;
+    return std::move(readMoment(*session, *moment, unread).front());
+  };
+  return finish(*result, session->views.front(), image, o, console);
 }
 
 Result<int> run(const Options& o, Console& console) {
@@ -302,6 +322,9 @@ Result<int> run(const Options& o, Console& console) {
     return usable.error();
   }
   if (auto free = checkOutputFolder(o.output, measurementFolder()); !free) return free.error();
+  if (!o.report.empty()) {
+    if (auto free = checkOutputFile(o.report, "<html"); !free) return free.error();
+  }
   return o.session.empty() ? runImages(o, console) : runSession(o, console);
 }
 

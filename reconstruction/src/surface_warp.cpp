@@ -127,36 +127,38 @@ void SurfaceWarp::refine(std::vector<RestVertex>& vertices) const {
     const SubsetMatcher matcher(reference, affine);
     for (const auto& [k, list] : others) {
       const SplineImage deformed(seenFrom(f, k));
-      parallelFor(list.size(), threads, [&, front = f, view = k](std::size_t n, std::size_t worker) {
-        const int i = list[n];
-        const VertexSighting& base = vertices[i].sightings.front();
-        const Vec2& pixel = base.sighting.pixel;
-        const auto match = matcher.match(deformed, pixel, base.centre, {}, scratch[worker]);
-        const Vec2 moved = match.warp.displacement();
-        const auto point = surfaceAt(views_[front], pixel + moved);
-        Eigen::Matrix<double, 2, 3> jacobian;
-        const auto seen = point ? views_[view].project(*point, &jacobian) : std::nullopt;
-        if (match.end != MatchEnd::kConverged || match.zncc < options_.correlate.min_zncc ||
-            moved.norm() > kFarthest_px || !seen) {
-          failed[i] = 1;
-          return;
-        }
-        const auto there = std::find_if(
-            refined[i].sightings.begin(), refined[i].sightings.end(),
-            [view](const VertexSighting& s) { return s.sighting.view == view; });
-        // The match's error is in the front view's pixels; the old match tells how they map.
-        Eigen::Matrix<double, 2, 3> by_front;
-        views_[front].project(*point, &by_front);
-        const SurfaceElement element = heights_.elementAt(
-            (sheet_from_space_ * *point).head<2>());
-        const Mat2 linear = (jacobian * element.tangents) * (by_front * element.tangents).inverse();
-        const Mat2 half = 0.5 * match.covariance_px2;
-        there->centre += *seen - there->sighting.pixel;
-        there->sighting.pixel = *seen;
-        there->sighting.covariance_px2 = linear * half * linear.transpose();
-        own[i] += half;
-        refined[i].zncc = std::max(refined[i].zncc, match.zncc);
-      });
+      parallelFor(
+          list.size(), threads, [&, front = f, view = k](std::size_t n, std::size_t worker) {
+            const int i = list[n];
+            const VertexSighting& base = vertices[i].sightings.front();
+            const Vec2& pixel = base.sighting.pixel;
+            const auto match = matcher.match(deformed, pixel, base.centre, {}, scratch[worker]);
+            const Vec2 moved = match.warp.displacement();
+            const auto point = surfaceAt(views_[front], pixel + moved);
+            Eigen::Matrix<double, 2, 3> jacobian;
+            const auto seen = point ? views_[view].project(*point, &jacobian) : std::nullopt;
+            if (match.end != MatchEnd::kConverged || match.zncc < options_.correlate.min_zncc ||
+                moved.norm() > kFarthest_px || !seen) {
+              failed[i] = 1;
+              return;
+            }
+            const auto there =
+                std::find_if(refined[i].sightings.begin(), refined[i].sightings.end(),
+                             [view](const VertexSighting& s) { return s.sighting.view == view; });
+            // The match's error is in the front view's pixels; the old match tells how they map.
+            Eigen::Matrix<double, 2, 3> by_front;
+            views_[front].project(*point, &by_front);
+            const SurfaceElement element =
+                heights_.elementAt((sheet_from_space_ * *point).head<2>());
+            const Mat2 linear =
+                (jacobian * element.tangents) * (by_front * element.tangents).inverse();
+            const Mat2 half = 0.5 * match.covariance_px2;
+            there->centre += *seen - there->sighting.pixel;
+            there->sighting.pixel = *seen;
+            there->sighting.covariance_px2 = linear * half * linear.transpose();
+            own[i] += half;
+            refined[i].zncc = std::max(refined[i].zncc, match.zncc);
+          });
     }
   }
   parallelFor(vertices.size(), threads, [&](std::size_t i, std::size_t) {

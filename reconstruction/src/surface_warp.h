@@ -10,8 +10,8 @@ namespace tenter {
 
 /// Matches once more with what the surface found so far does to the images taken out: each view is
 /// seen as another one would see it if the surface were right, and what is left is so small and
-/// smooth that affine subsets follow it. Their noise is half of that of quadratic ones, and wrinkles
-/// no longer bias them (docs/reconstruction.md).
+/// smooth that affine subsets follow it. Their noise is half of that of quadratic ones, and
+/// wrinkles no longer bias them (docs/reconstruction.md).
 class SurfaceWarp {
  public:
   /// Holds references to all of them; they must outlive it.
