@@ -19,7 +19,8 @@ constexpr double kMmPerMetre = 1e3;
 constexpr double kHighest = 0.98;
 
 constexpr const char* kHead =
-    "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>Reconstruction</title><style>"
+    "<!DOCTYPE html><html lang=\"en\"><head><meta "
+    "charset=\"utf-8\"><title>Reconstruction</title><style>"
     "body{font:15px sans-serif;max-width:70em;margin:2em auto;padding:0 1em}table{border-collapse:"
     "collapse}td,th{border:1px solid #ccc;padding:2px 8px;text-align:right}figure{display:"
     "inline-block;margin:.6em}figcaption{color:#444}td.text{text-align:left}</style></head><body>";
@@ -76,11 +77,13 @@ std::string driftText(const SeriesResult& result) {
     return sum / static_cast<double>(part);
   };
   const double first = mean(0), last = mean(result.quality.size() - part);
-  return "<p>Every frame is matched to the reference, so errors cannot add up. If views drifted, they "
+  return "<p>Every frame is matched to the reference, so errors cannot add up. If views drifted, "
+         "they "
          "would come to disagree: the median residual is " +
          number("%.4f", first) + " px over the first fifth of the frames and " +
          number("%.4f", last) + " px over the last. " +
-         (last <= 2.0 * first + 0.02 ? "No drift is seen." : "<b>Views disagree more at the end.</b>") +
+         (last <= 2.0 * first + 0.02 ? "No drift is seen."
+                                     : "<b>Views disagree more at the end.</b>") +
          "</p>";
 }
 
@@ -92,7 +95,8 @@ std::string map(const SeriesResult& result, const std::string& title, std::vecto
   }
   if (sorted.empty()) return "";
   std::sort(sorted.begin(), sorted.end());
-  const double high = sorted[static_cast<std::size_t>(kHighest * static_cast<double>(sorted.size() - 1))];
+  const double high =
+      sorted[static_cast<std::size_t>(kHighest * static_cast<double>(sorted.size() - 1))];
   const double low = from_zero ? 0.0 : sorted.front();
   return "<figure>" + mapPicture(result.rest, values, low, high) + "<figcaption>" +
          htmlText(title) + ": " + number("%.4g", low) + " (blue) to " + number("%.4g", high) +
@@ -110,7 +114,8 @@ std::string maps(const SeriesResult& result) {
     return values;
   };
   std::vector<double> coverage;
-  for (const int valid : m.valid) coverage.push_back(static_cast<double>(valid) / std::max(m.frames, 1));
+  for (const int valid : m.valid)
+    coverage.push_back(static_cast<double>(valid) / std::max(m.frames, 1));
   return map(result, "share of frames in which a vertex was seen", coverage, true) +
          map(result, "mean ZNCC", mean(m.zncc, 1.0), false) +
          map(result, "mean residual [px]", mean(m.residual_px, 1.0), true) +
@@ -149,7 +154,8 @@ std::string qualityReport(const SeriesResult& result, const CameraView& view,
           " vertices; at rest " + std::to_string(result.rest.validCount()) +
           " were found, views disagree by " + number("%.4f", result.rest.residual_px) +
           " px, a pixel covers " + number("%.4f", kMmPerMetre * result.rest.pixel_m) + " mm.</p>";
-  for (const std::string& warning : result.warnings) html += "<p><b>" + htmlText(warning) + "</b></p>";
+  for (const std::string& warning : result.warnings)
+    html += "<p><b>" + htmlText(warning) + "</b></p>";
   html += "<h2>Over the frames</h2>" + curves(result, vertices);
   html += "<h2>Drift check</h2>" + driftText(result);
   html += "<h2>Over the mesh</h2>" + maps(result);

@@ -120,6 +120,14 @@ cv::Mat RectifiedPair::maskA() const {
   return mask;
 }
 
+Vec3 RectifiedPair::disparitiesOf(const Vec3& point_m, const Vec3& normal) const {
+  const Vec3 n = rectified_from_space_ * normal;
+  const double distance_m = normal.dot(point_m - a_.centre());
+  const Vec3 slopes = baseline_m_ / distance_m * n;
+  return {slopes.x(), slopes.y(),
+          slopes.x() * x0_a_ + slopes.y() * y0_ + slopes.z() * focal_px_ - disparityOffset()};
+}
+
 Vec3 RectifiedPair::point(double x, double y, double disparity) const {
   const double whole = disparity + disparityOffset();
   const double depth_m = focal_px_ * baseline_m_ / whole;

@@ -33,6 +33,9 @@ class RectifiedPair {
   /// 255 where a rectified pixel of A shows a pixel of the camera.
   cv::Mat maskA() const;
 
+  /// Disparities, as slope_x x + slope_y y + offset, of the plane through a point. Precondition: it
+  /// does not pass through the camera A.
+  Vec3 disparitiesOf(const Vec3& point_m, const Vec3& normal) const;
   /// Point in space of a place in A [px] and its disparity in columns, xA - xB.
   Vec3 point(double x, double y, double disparity) const;
   /// Pixel of the camera A that stands at a place in A.

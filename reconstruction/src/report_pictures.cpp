@@ -105,9 +105,9 @@ std::string curvePicture(const std::string& title, const std::vector<double>& va
   std::string points;
   char text[160];
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const double x = values.size() > 1
-                         ? kCurveWidth * static_cast<double>(i) / (static_cast<double>(values.size()) - 1.0)
-                         : 0.5 * kCurveWidth;
+    const double x = values.size() > 1 ? kCurveWidth * static_cast<double>(i) /
+                                             (static_cast<double>(values.size()) - 1.0)
+                                       : 0.5 * kCurveWidth;
     const double y = kCurveHeight * (1.0 - (most > 0.0 ? values[i] / most : 0.0));
     std::snprintf(text, sizeof text, "%.1f,%.1f ", x, y);
     points += text;

@@ -15,12 +15,19 @@ struct SeenPoint {
   Vec2 pixel;  ///< Of the first view.
 };
 
+/// Where a surface is known to lie: within `thickness_m` of a plane, to either side.
+struct FlatPrior {
+  Vec3 point_m, normal;
+  double thickness_m;
+};
+
 /// Where a surface lies, to about a quarter of a pixel: the pair is rectified, seeds tell the plane
-/// that lies nearest to it, and semi-global matching [Hir08] finds what departs from that plane.
+/// that lies nearest to it
+/// unless `prior` knows one, and semi-global matching [Hir08] finds what departs from that plane.
 /// One point for each `step_px` x `step_px` pixels of the first view in which the two agree.
 /// Images are 8-bit. Error (without a file) if the two do not show a common surface.
 Result<std::vector<SeenPoint>> semiGlobalPoints(const CameraView& a, const cv::Mat& image_a,
                                                 const CameraView& b, const cv::Mat& image_b,
-                                                int step_px);
+                                                int step_px, const FlatPrior* prior = nullptr);
 
 }  // namespace tenter

@@ -34,7 +34,8 @@ double printAt(const cv::Mat& cells, const Vec2& place) {
   const Vec2 cell = (place / kTag_m + Vec2::Constant(0.5)) * kCells;
   if (cell.minCoeff() < -1.0 || cell.maxCoeff() > kCells + 1.0) return 60.0;
   if (cell.minCoeff() < 0.0 || cell.maxCoeff() >= kCells) return 210.0;
-  return cells.at<uchar>(static_cast<int>(cell.y()), static_cast<int>(cell.x())) > 127 ? 210.0 : 25.0;
+  return cells.at<uchar>(static_cast<int>(cell.y()), static_cast<int>(cell.x())) > 127 ? 210.0
+                                                                                       : 25.0;
 }
 
 GrayImage photographTags(const CameraView& view, const MountedClip& clip,
@@ -49,8 +50,10 @@ GrayImage photographTags(const CameraView& view, const MountedClip& clip,
     const Vec3 from = tag_from_space * view.centre();
     const Vec2 middle = *view.project(rig_from_clip * tag.clip_from_tag.translation());
     const int reach = static_cast<int>(1.2 * kTag_m * view.model.lens().fx_px / 0.5);
-    for (int y = std::max(0, int(middle.y()) - reach); y < std::min(image.height, int(middle.y()) + reach); ++y) {
-      for (int x = std::max(0, int(middle.x()) - reach); x < std::min(image.width, int(middle.x()) + reach); ++x) {
+    for (int y = std::max(0, int(middle.y()) - reach);
+         y < std::min(image.height, int(middle.y()) + reach); ++y) {
+      for (int x = std::max(0, int(middle.x()) - reach);
+           x < std::min(image.width, int(middle.x()) + reach); ++x) {
         double sum = 0.0;
         for (int j = 0; j < kRays; ++j) {
           for (int i = 0; i < kRays; ++i) {

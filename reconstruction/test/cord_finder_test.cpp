@@ -35,7 +35,8 @@ TEST(CordFinder, FindsADirectionToATwentiethOfADegree) {
   const auto views = fourCameras();
   const Vec3 from(0.02, 0.03, 0.0), to(0.09, 0.08, 0.02);
   std::vector<GrayImage> images;
-  for (unsigned v = 0; v < views.size(); ++v) images.push_back(photographCord(views[v], from, to, 60 + v));
+  for (unsigned v = 0; v < views.size(); ++v)
+    images.push_back(photographCord(views[v], from, to, 60 + v));
   const CordGuess guess{from + Vec3(4e-4, 0.0, 0.0), to + Vec3(-1e-3, 1.5e-3, 1e-3), kDiameter_m};
   const auto found = findCord(views, images, guess);
   ASSERT_TRUE(found);
