@@ -81,7 +81,7 @@ Vec3 medianPoint(const std::vector<Vec3>& points) {
 
 Result<CoarseCloud> coarseCloud(const std::vector<CameraView>& views,
                                 const std::vector<GrayImage>& images,
-                                const std::function<bool()>& keep_going) {
+                                const std::function<bool()>& keep_going, const FlatPrior* prior) {
   std::vector<cv::Mat> pixels;
   for (const GrayImage& image : images) {
     pixels.push_back(image.width > 0 ? eightBits(image) : cv::Mat());
@@ -94,8 +94,8 @@ Result<CoarseCloud> coarseCloud(const std::vector<CameraView>& views,
                         "is the calibration that of these cameras?");
   for (const Pair& pair : choosePairs(views, images)) {
     if (keep_going && !keep_going()) return notConverged("stopped by the user");
-    const auto points =
-        semiGlobalPoints(views[pair.a], pixels[pair.a], views[pair.b], pixels[pair.b], kStep_px);
+    const auto points = semiGlobalPoints(views[pair.a], pixels[pair.a], views[pair.b],
+                                         pixels[pair.b], kStep_px, prior);
     if (points) {
       addPoints(*points, views[pair.a], cloud, pixel_sizes);
     } else {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "height_field.h"
+#include "semi_global.h"
 #include "tenter/core/result.h"
 #include "tenter/reconstruction/camera_view.h"
 #include "tenter/reconstruction/gray_image.h"
@@ -21,10 +22,11 @@ struct CoarseCloud {
 };
 
 /// Error, with the last pair's reason, if no pair sees a surface. Views whose image is empty are
-/// left out.
+/// left out. `prior` (may be null): where the surface is known to lie.
 Result<CoarseCloud> coarseCloud(const std::vector<CameraView>& views,
                                 const std::vector<GrayImage>& images,
-                                const std::function<bool()>& keep_going);
+                                const std::function<bool()>& keep_going,
+                                const FlatPrior* prior = nullptr);
 
 /// Frame of the plane that a cloud lies nearest to: z towards the cameras, x as the columns of the
 /// first view run, the origin in the cloud's middle. Robust against what lies elsewhere.

@@ -21,7 +21,12 @@ constexpr double kLeastDeviation = 3.0;
 /// A second place that fits so well beside the best makes a seed useless.
 constexpr double kSecond = 0.88;
 constexpr int kPeakApart_px = 6;
+/// How a piece may be stretched along its rows and sheared from row to row.
 constexpr double kStretches[] = {1.0, 0.8, 1.25, 0.65, 1.5};
+constexpr double kShears[] = {0.0, 0.15, -0.15, 0.3, -0.3, 0.45, -0.45};
+/// Once so many seeds were found, only the shapes that most of them had are tried.
+constexpr int kEnoughSeeds = 10;
+constexpr std::size_t kUsualShapes = 3;
 constexpr int kLeastSeeds = 12, kTrials = 500;
 /// Seeds so near to a plane vote for it, as a share of the image's width.
 constexpr double kVote = 0.012;
@@ -49,30 +54,78 @@ std::optional<std::pair<double, double>> bestColumn(const cv::Mat& strip, const 
   return std::make_pair(static_cast<double>(at.x), best);
 }
 
+/// How pieces were deformed between the images, the usual ways first.
+class Shapes {
+ public:
+  struct Shape {
+    double stretch, shear;
+    int seeds = 0;
+  };
+
+  Shapes() {
+    for (const double shear : kShears) {
+      for (const double stretch : kStretches) shapes_.push_back({stretch, shear});
+    }
+  }
+
+  std::vector<std::size_t> order() const {
+    std::vector<std::size_t> order(shapes_.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
+      return shapes_[a].seeds > shapes_[b].seeds;
+    });
+    if (found_ >= kEnoughSeeds) order.resize(kUsualShapes);
+    return order;
+  }
+  const Shape& operator[](std::size_t i) const { return shapes_[i]; }
+  void count(std::size_t i) {
+    ++shapes_[i].seeds;
+    ++found_;
+  }
+
+ private:
+  std::vector<Shape> shapes_;
+  int found_ = 0;
+};
+
+/// A piece of A around a pixel, stretched along its rows and sheared.
+cv::Mat pieceAround(const cv::Mat& a, cv::Point at, const Shapes::Shape& shape) {
+  const int half = static_cast<int>(std::lround(kHalf_px * shape.stretch));
+  // From the piece's pixels to A's.
+  const double along = 1.0 / shape.stretch, across = -shape.shear / shape.stretch;
+  const cv::Matx23d from_piece(along, across, at.x - along * half - across * kHalf_px, 0.0, 1.0,
+                               at.y - kHalf_px);
+  cv::Mat piece;
+  cv::warpAffine(a, piece, from_piece, cv::Size(2 * half + 1, 2 * kHalf_px + 1),
+                 cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  return piece;
+}
+
 std::optional<Seed> seedAt(const cv::Mat& a, const cv::Mat& b, cv::Point at, double least,
-                           double most) {
-  const int side = 2 * kHalf_px + 1;
-  const cv::Mat piece = a(cv::Rect(at.x - kHalf_px, at.y - kHalf_px, side, side));
+                           double most, Shapes& shapes) {
   cv::Scalar mean, deviation;
-  cv::meanStdDev(piece, mean, deviation);
+  const int side = 2 * kHalf_px + 1;
+  cv::meanStdDev(a(cv::Rect(at.x - kHalf_px, at.y - kHalf_px, side, side)), mean, deviation);
   if (deviation[0] < kLeastDeviation) return std::nullopt;
   std::optional<Seed> best;
+  std::size_t best_shape = 0;
   double best_zncc = 0.0;
-  for (const double stretch : kStretches) {
-    cv::Mat wide;
-    const int width = 2 * static_cast<int>(std::lround(kHalf_px * stretch)) + 1;
-    cv::resize(piece, wide, cv::Size(width, side), 0.0, 0.0, cv::INTER_LINEAR);
-    const int left = std::max(0, static_cast<int>(at.x - most) - width / 2);
-    const int right = std::min(b.cols, static_cast<int>(at.x - least) + width / 2 + 1);
+  for (const std::size_t i : shapes.order()) {
+    const cv::Mat piece = pieceAround(a, at, shapes[i]);
+    const int half = piece.cols / 2;
+    const int left = std::max(0, static_cast<int>(at.x - most) - half);
+    const int right = std::min(b.cols, static_cast<int>(at.x - least) + half + 1);
     const int top = std::max(0, at.y - kHalf_px - kRows);
     const int bottom = std::min(b.rows, at.y + kHalf_px + kRows + 1);
-    if (right - left < width || bottom - top < side) continue;
-    const auto found = bestColumn(b(cv::Rect(left, top, right - left, bottom - top)), wide);
+    if (right - left < piece.cols || bottom - top < side) continue;
+    const auto found = bestColumn(b(cv::Rect(left, top, right - left, bottom - top)), piece);
     if (!found || found->second <= best_zncc) continue;
     best_zncc = found->second;
-    best = Seed{double(at.x), double(at.y), at.x - (left + found->first + width / 2)};
+    best_shape = i;
+    best = Seed{double(at.x), double(at.y), at.x - (left + found->first + half)};
     if (best_zncc > kGoodZncc) break;
   }
+  if (best) shapes.count(best_shape);
   return best;
 }
 
@@ -101,12 +154,13 @@ Vec3 fit(const std::vector<const Seed*>& seeds) {
 std::vector<Seed> sow(const cv::Mat& a, const cv::Mat& mask_a, const cv::Mat& b, double least,
                       double most) {
   std::vector<Seed> seeds;
+  Shapes shapes;
   const int step = std::max(8, std::max(a.cols, a.rows) / kSeedsAcross);
   for (int y = kHalf_px; y + kHalf_px < a.rows; y += step) {
     for (int x = kHalf_px; x + kHalf_px < a.cols; x += step) {
       const cv::Rect around(x - kHalf_px, y - kHalf_px, 2 * kHalf_px + 1, 2 * kHalf_px + 1);
       if (cv::countNonZero(mask_a(around)) < around.area()) continue;
-      if (const auto seed = seedAt(a, b, {x, y}, least, most)) seeds.push_back(*seed);
+      if (const auto seed = seedAt(a, b, {x, y}, least, most, shapes)) seeds.push_back(*seed);
     }
   }
   return seeds;

@@ -25,7 +25,7 @@ constexpr int kRepeatPlaces = 3;
 constexpr double kRepeats = 0.85;
 constexpr std::size_t kLeastVertices = 9;
 /// A sheet lies this near to its plane at rest, in parts of its size.
-constexpr double kFlatness = 0.25;
+constexpr double kFlatness = 0.05;
 /// How much larger than the sheet the part of the cloud is that counts.
 constexpr double kBorder = 0.05;
 
@@ -215,10 +215,13 @@ Result<RestSurface> findSheet(const std::vector<CameraView>& views,
   const auto going = [&] {
     return !options.correlate.keep_going || options.correlate.keep_going(0.0);
   };
-  auto cloud = coarseCloud(views, images, going);
+  const Vec2 size = Vec2(grid.columns - 1, grid.rows - 1).cwiseProduct(grid.spacing_m);
+  const double thickness_m = kFlatness * size.maxCoeff();
+  const FlatPrior prior{grid.space_from_sheet * Vec3(grid.origin_m.x(), grid.origin_m.y(), 0.0),
+                        grid.space_from_sheet.linear().col(2), thickness_m};
+  auto cloud = coarseCloud(views, images, going, &prior);
   if (!cloud) return cloud.error();
   const Eigen::Isometry3d sheet_from_space = grid.space_from_sheet.inverse();
-  const Vec2 size = Vec2(grid.columns - 1, grid.rows - 1).cwiseProduct(grid.spacing_m);
   const Vec2 border = Vec2::Constant(kBorder * size.maxCoeff());
   std::vector<Vec3> points;
   for (const Vec3& point : cloud->points_m) {
@@ -226,7 +229,7 @@ Result<RestSurface> findSheet(const std::vector<CameraView>& views,
     const Vec2 place = at.head<2>() - grid.origin_m;
     const bool over = (place.array() >= -border.array()).all() &&
                       (place.array() <= (size + border).array()).all();
-    if (over && std::abs(at.z()) <= kFlatness * size.maxCoeff()) points.push_back(at);
+    if (over && std::abs(at.z()) <= thickness_m) points.push_back(at);
   }
   if (points.size() < kLeastVertices) {
     return badInput("", "", "no surface was found where the sample should lie",

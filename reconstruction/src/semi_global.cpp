@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "disparity_seeds.h"
 #include "rectified_pair.h"
@@ -33,6 +34,21 @@ cv::Mat residualDisparity(const cv::Mat& a, const cv::Mat& b, int least, int cou
   cv::Mat result;
   matcher->compute(a, b, result);
   return result;
+}
+
+/// Disparities of what lies near a known plane; nothing if that passes by the camera.
+std::optional<DisparityPlane> planeOfPrior(const RectifiedPair& pair, const FlatPrior& prior,
+                                           const CameraView& a) {
+  const double distance_m = std::abs(prior.normal.dot(prior.point_m - a.centre()));
+  if (!(distance_m > 2.0 * prior.thickness_m)) return std::nullopt;
+  DisparityPlane plane{pair.disparitiesOf(prior.point_m, prior.normal), 0.0, 0.0, 0};
+  // Disparity goes with the inverse of depth.
+  const double middle = plane.plane.x() * 0.5 * pair.widthA() +
+                        plane.plane.y() * 0.5 * pair.height() + plane.plane.z();
+  const double whole = std::abs(middle + pair.disparityOffset());
+  plane.most_px = whole * prior.thickness_m / (distance_m - prior.thickness_m);
+  plane.least_px = -plane.most_px;
+  return plane;
 }
 
 /// Standard deviation of grey levels around each pixel.
@@ -65,7 +81,7 @@ double medianDeviation(const cv::Mat& deviations, const cv::Mat& disparity, int 
 
 Result<std::vector<SeenPoint>> semiGlobalPoints(const CameraView& a, const cv::Mat& image_a,
                                                 const CameraView& b, const cv::Mat& image_b,
-                                                int step_px) {
+                                                int step_px, const FlatPrior* prior) {
   const std::string names = "'" + a.name + "' and '" + b.name + "'";
   const auto pair = RectifiedPair::make(a, b);
   if (!pair) {
@@ -73,9 +89,11 @@ Result<std::vector<SeenPoint>> semiGlobalPoints(const CameraView& a, const cv::M
                     "is the calibration that of these cameras?");
   }
   const cv::Mat rectified_a = pair->imageA(image_a), mask = pair->maskA();
-  const auto plane = findDisparityPlane(
-      rectified_a, mask, pair->imageB(image_b),
-      std::max(1.0 - pair->widthB(), 1.0 - pair->disparityOffset()), pair->widthA());
+  const auto plane =
+      prior ? planeOfPrior(*pair, *prior, a)
+            : findDisparityPlane(rectified_a, mask, pair->imageB(image_b),
+                                 std::max(1.0 - pair->widthB(), 1.0 - pair->disparityOffset()),
+                                 pair->widthA());
   if (!plane) {
     return badInput("", "",
                     "cameras " + names + " show no common texture where the calibration says",

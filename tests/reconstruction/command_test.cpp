@@ -75,9 +75,15 @@ class ReconstructCommand : public testing::Test {
   }
 
   Outcome run(std::vector<std::string> more = {}) {
-    std::vector<std::string> arguments = {"reconstruct",   "--images", "{camera}_{frame:04}.tif",
-                                          "--calibration", "cal.json", "-o",
-                                          "m",             "--json",   "--vertices",
+    std::vector<std::string> arguments = {"reconstruct",
+                                          "--images",
+                                          "{camera}_{frame:04}.tif",
+                                          "--calibration",
+                                          "cal.json",
+                                          "-o",
+                                          "m",
+                                          "--json",
+                                          "--vertices",
                                           "30"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return tenter(arguments, folder_.path());
