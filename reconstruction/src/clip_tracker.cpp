@@ -14,7 +14,7 @@ namespace {
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr int kMaxIterations = 40;
+constexpr int kMaxIterations = 40, kPlainIterations = 8;
 constexpr double kSmallStep = 1e-10;
 /// Corners farther than this from the projection count less, and in the end not at all [px].
 constexpr double kLoss_px = 0.3, kStray_px = 1.5;
@@ -81,9 +81,10 @@ std::optional<ClipPose> ClipTracker::fit(std::vector<Corner> corners,
         jacobian << by_point * -crossMatrix(at - pivot), by_point;
         const Vec2 residual = corner.pixel - *pixel;
         const double variance = corner.sigma_px * corner.sigma_px;
-        // Cauchy's loss while strays are still among them.
+        // Cauchy's loss while strays are still among them, once the pose is near.
+        const bool robust = pass == 0 && i >= kPlainIterations;
         const double loss =
-            pass == 0 ? 1.0 / (1.0 + residual.squaredNorm() / (kLoss_px * kLoss_px)) : 1.0;
+            robust ? 1.0 / (1.0 + residual.squaredNorm() / (kLoss_px * kLoss_px)) : 1.0;
         normal += loss / variance * jacobian.transpose() * jacobian;
         gradient += loss / variance * jacobian.transpose() * residual;
         squares += residual.squaredNorm();
@@ -92,7 +93,7 @@ std::optional<ClipPose> ClipTracker::fit(std::vector<Corner> corners,
       const Vec6 step = normal.ldlt().solve(gradient);
       if (!step.allFinite()) return std::nullopt;
       result.rig_from_clip = moved(result.rig_from_clip, step, pivot);
-      if (step.norm() < kSmallStep) break;
+      if (step.norm() < kSmallStep && (pass == 1 || i > kPlainIterations)) break;
     }
     const auto count = static_cast<double>(corners.size());
     result.residual_px = std::sqrt(squares / count);

@@ -19,8 +19,10 @@ namespace {
 constexpr int kEdgePlaces = 24;
 constexpr double kFirst = 0.12, kLast = 0.88;
 /// How far across, as a share of the side, and at most [px].
-constexpr double kReachShare = 0.08, kMostReach_px = 5.0, kLeastReach_px = 2.0;
+constexpr double kReachShare = 0.11, kMostReach_px = 6.0, kLeastReach_px = 2.75;
 constexpr double kStep_px = 0.25;
+/// Slopes this near to the steepest belong to its edge.
+constexpr double kBlur_px = 1.25;
 constexpr double kLeastContrast = 10.0;  ///< Grey levels over an edge.
 /// Edge places farther from their line than this many times the median are left out.
 constexpr double kStray = 3.0, kStrayFixed_px = 0.05;
@@ -50,7 +52,7 @@ std::optional<double> edgeAlong(const GrayImage& image, const Vec2& middle, cons
   for (std::size_t i = 0; i + 1 < values.size(); ++i) slopes.push_back(values[i + 1] - values[i]);
   const auto steepest = std::max_element(slopes.begin(), slopes.end());
   const auto at = static_cast<int>(steepest - slopes.begin());
-  const int window = static_cast<int>(1.5 / kStep_px);
+  const int window = static_cast<int>(kBlur_px / kStep_px);
   if (at < window || at + window >= static_cast<int>(slopes.size())) return std::nullopt;
   double sum = 0.0, moment = 0.0;
   for (int i = at - window; i <= at + window; ++i) {
@@ -157,7 +159,8 @@ Result<std::vector<SeenTag>> findTags(const GrayImage& image,
     for (std::size_t i = 0; i < ids.size(); ++i) {
       SeenTag tag{family, ids[i], {}, 0.0};
       for (std::size_t k = 0; k < 4; ++k) tag.corners[k] = Vec2(corners[i][k].x, corners[i][k].y);
-      if (refine(image, tag)) tags.push_back(tag);
+      // The second time from where the first has led.
+      if (refine(image, tag) && refine(image, tag)) tags.push_back(tag);
     }
   }
   return tags;
