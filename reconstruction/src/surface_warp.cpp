@@ -106,73 +106,90 @@ bool SurfaceWarp::subsetOnGrid(const RestVertex& vertex) const {
   return true;
 }
 
+SurfaceWarp::Correction SurfaceWarp::correct(const RestVertex& vertex, int view,
+                                             const SubsetMatcher& matcher,
+                                             const SplineImage& deformed,
+                                             MatchScratch& scratch) const {
+  Correction correction;
+  const VertexSighting& base = vertex.sightings.front();
+  const CameraView &front = views_[base.sighting.view], &other = views_[view];
+  const SubsetMatch match =
+      matcher.match(deformed, base.sighting.pixel, base.centre, SubsetWarp(), scratch);
+  const Vec2 moved = match.warp.displacement();
+  if (match.end != MatchEnd::kConverged || match.zncc < options_.correlate.min_zncc ||
+      moved.norm() > kFarthest_px) {
+    return correction;
+  }
+  const auto point = surfaceAt(front, base.sighting.pixel + moved);
+  if (!point) return correction;
+  // The match's error is in the front view's pixels; the surface says how they map.
+  SurfaceElement element = heights_.elementAt((sheet_from_space_ * *point).head<2>());
+  element.point_m = *point;
+  const auto here = viewElement(front, element), there = viewElement(other, element);
+  if (!here || !there) return correction;
+  const Mat2 linear = there->pixel_from_tangents * here->pixel_from_tangents.inverse();
+  correction.good = true;
+  correction.pixel = there->pixel;
+  correction.front_covariance_px2 = 0.5 * match.covariance_px2;
+  correction.covariance_px2 = linear * correction.front_covariance_px2 * linear.transpose();
+  correction.zncc = match.zncc;
+  return correction;
+}
+
+void SurfaceWarp::apply(const std::vector<std::pair<int, Correction>>& corrections,
+                        RestVertex& vertex) const {
+  if (corrections.size() + 1 != vertex.sightings.size()) return;
+  RestVertex refined = vertex;
+  Mat2 own = Mat2::Zero();
+  refined.zncc = 1.0;
+  for (const auto& [view, correction] : corrections) {
+    if (!correction.good) return;
+    for (VertexSighting& s : refined.sightings) {
+      if (s.sighting.view != view) continue;
+      s.centre += correction.pixel - s.sighting.pixel;
+      s.sighting.pixel = correction.pixel;
+      s.sighting.covariance_px2 = correction.covariance_px2;
+    }
+    own += correction.front_covariance_px2 / static_cast<double>(corrections.size());
+    refined.zncc = std::min(refined.zncc, correction.zncc);
+  }
+  refined.sightings.front().sighting.covariance_px2 = own;
+  std::vector<Sighting> sightings;
+  for (const VertexSighting& s : refined.sightings) sightings.push_back(s.sighting);
+  const auto point = triangulate(views_, sightings, &vertex.point.position_m);
+  if (!point || point->residual_px > options_.max_residual_px) return;
+  refined.point = *point;
+  vertex = std::move(refined);
+}
+
 void SurfaceWarp::refine(std::vector<RestVertex>& vertices) const {
-  std::map<int, std::map<int, std::vector<int>>> tasks;
+  // Which vertices each pair of front view and other view has.
+  std::map<std::pair<int, int>, std::vector<int>> tasks;
   for (int i = 0; i < static_cast<int>(vertices.size()); ++i) {
     if (vertices[i].state != PointState::kValid || !subsetOnGrid(vertices[i])) continue;
     const auto& sightings = vertices[i].sightings;
     for (std::size_t s = 1; s < sightings.size(); ++s) {
-      tasks[sightings.front().sighting.view][sightings[s].sighting.view].push_back(i);
+      tasks[{sightings.front().sighting.view, sightings[s].sighting.view}].push_back(i);
     }
   }
   MatchOptions affine = options_.correlate.match;
   affine.order = 1;
   const int threads = options_.correlate.threads;
   std::vector<MatchScratch> scratch(static_cast<std::size_t>(std::max(threads, 1)));
-  std::vector<RestVertex> refined = vertices;
-  std::vector<std::uint8_t> failed(vertices.size());
-  std::vector<Mat2> own(vertices.size(), Mat2::Zero());
-  for (const auto& [f, others] : tasks) {
-    const GradientImage reference(images_[f]);
+  std::vector<std::vector<std::pair<int, Correction>>> corrections(vertices.size());
+  for (const auto& [pair, list] : tasks) {
+    const auto [front, view] = pair;
+    const GradientImage reference(images_[front]);
     const SubsetMatcher matcher(reference, affine);
-    for (const auto& [k, list] : others) {
-      const SplineImage deformed(seenFrom(f, k));
-      parallelFor(
-          list.size(), threads, [&, front = f, view = k](std::size_t n, std::size_t worker) {
-            const int i = list[n];
-            const VertexSighting& base = vertices[i].sightings.front();
-            const Vec2& pixel = base.sighting.pixel;
-            const auto match = matcher.match(deformed, pixel, base.centre, {}, scratch[worker]);
-            const Vec2 moved = match.warp.displacement();
-            const auto point = surfaceAt(views_[front], pixel + moved);
-            Eigen::Matrix<double, 2, 3> jacobian;
-            const auto seen = point ? views_[view].project(*point, &jacobian) : std::nullopt;
-            if (match.end != MatchEnd::kConverged || match.zncc < options_.correlate.min_zncc ||
-                moved.norm() > kFarthest_px || !seen) {
-              failed[i] = 1;
-              return;
-            }
-            const auto there =
-                std::find_if(refined[i].sightings.begin(), refined[i].sightings.end(),
-                             [view](const VertexSighting& s) { return s.sighting.view == view; });
-            // The match's error is in the front view's pixels; the old match tells how they map.
-            Eigen::Matrix<double, 2, 3> by_front;
-            views_[front].project(*point, &by_front);
-            const SurfaceElement element =
-                heights_.elementAt((sheet_from_space_ * *point).head<2>());
-            const Mat2 linear =
-                (jacobian * element.tangents) * (by_front * element.tangents).inverse();
-            const Mat2 half = 0.5 * match.covariance_px2;
-            there->centre += *seen - there->sighting.pixel;
-            there->sighting.pixel = *seen;
-            there->sighting.covariance_px2 = linear * half * linear.transpose();
-            own[i] += half;
-            refined[i].zncc = std::max(refined[i].zncc, match.zncc);
-          });
-    }
+    const SplineImage deformed(seenFrom(front, view));
+    parallelFor(list.size(), threads, [&, other = view](std::size_t n, std::size_t worker) {
+      const int i = list[n];
+      corrections[i].emplace_back(other,
+                                  correct(vertices[i], other, matcher, deformed, scratch[worker]));
+    });
   }
-  parallelFor(vertices.size(), threads, [&](std::size_t i, std::size_t) {
-    if (failed[i] != 0 || own[i].isZero()) return;
-    RestVertex& vertex = refined[i];
-    vertex.sightings.front().sighting.covariance_px2 =
-        own[i] / static_cast<double>(vertex.sightings.size() - 1);
-    std::vector<Sighting> sightings;
-    for (const VertexSighting& s : vertex.sightings) sightings.push_back(s.sighting);
-    const auto point = triangulate(views_, sightings, &vertex.point.position_m);
-    if (!point || point->residual_px > options_.max_residual_px) return;
-    vertex.point = *point;
-    vertices[i] = vertex;
-  });
+  parallelFor(vertices.size(), threads,
+              [&](std::size_t i, std::size_t) { apply(corrections[i], vertices[i]); });
 }
 
 }  // namespace tenter

@@ -22,6 +22,18 @@ class SurfaceWarp {
   void refine(std::vector<RestVertex>& vertices) const;
 
  private:
+  /// What matching once more makes of one sighting.
+  struct Correction {
+    bool good = false;
+    Vec2 pixel = Vec2::Zero();
+    Mat2 covariance_px2 = Mat2::Zero(), front_covariance_px2 = Mat2::Zero();
+    double zncc = 0.0;
+  };
+  Correction correct(const RestVertex& vertex, int view, const SubsetMatcher& matcher,
+                     const SplineImage& deformed, MatchScratch& scratch) const;
+  /// By view; nothing happens unless all sightings but the front view's were corrected.
+  void apply(const std::vector<std::pair<int, Correction>>& corrections, RestVertex& vertex) const;
+
   /// The surface where a pixel of a view sees it; nothing beside the grid.
   std::optional<Vec3> surfaceAt(const CameraView& view, const Vec2& pixel) const;
   double heightAt(const Vec2& place) const;

@@ -87,72 +87,84 @@ std::optional<SeedSearch::Repeat> ViewMatcher::repeatOf(const SurfaceElement& el
   return search.repeatOf(*views_[front].project(element.point_m));
 }
 
+ViewMatcher::Found ViewMatcher::findIn(int k, int front, const Subset& subset,
+                                       const SurfaceElement& element, const SurfaceElement& centre,
+                                       MatchScratch& scratch) const {
+  Found found;
+  const auto there = viewElement(views_[k], element);
+  const auto middle = views_[k].project(centre.point_m);
+  if (!there || !middle || !subsetInside(k, *middle)) return found;
+  const View &reference = *prepared_[front], &deformed = *prepared_[k];
+  CorrelatedPoint point;
+  point.position = subset.seen.pixel;
+  const SubsetWarp guess =
+      SubsetWarp::affine(there->pixel - subset.seen.pixel,
+                         there->pixel_from_tangents * subset.seen.pixel_from_tangents.inverse());
+  point.match =
+      reference.matcher->match(deformed.spline, subset.seen.pixel, subset.middle, guess, scratch);
+  found.state = MatchJudge(reference.ends, deformed.ends, options_.correlate).stateOf(point);
+  // The noise of the front view's subset moves all matches alike; half of each match's variance is
+  // of that subset, and is given to its own sighting.
+  const Mat2 linear = point.match.warp.linear(), back = linear.inverse();
+  const Mat2 half = 0.5 * point.match.covariance_px2;
+  const Vec2 pixel = subset.seen.pixel + point.match.warp.displacement();
+  found.sighting = {{k, pixel, half}, pixel + linear * (subset.middle - subset.seen.pixel)};
+  found.front_covariance_px2 = back * half * back.transpose();
+  found.zncc = point.match.zncc;
+  return found;
+}
+
+/// Triangulates a vertex; sightings that contradict the others are left out, worst first.
+void ViewMatcher::settle(const Vec3& guess, RestVertex& vertex) const {
+  std::vector<Sighting> sightings;
+  while (vertex.sightings.size() >= 2) {
+    sightings.clear();
+    for (const VertexSighting& s : vertex.sightings) sightings.push_back(s.sighting);
+    const auto point = triangulate(views_, sightings, &guess);
+    vertex.state = PointState::kNotFound;
+    if (!point) return;
+    vertex.point = *point;
+    const double freedom = 2.0 * static_cast<double>(sightings.size()) - 3.0;
+    const bool fit = point->chi2 <= kLargestChi * kLargestChi * freedom ||
+                     point->residual_px <= kFixedShare * options_.max_residual_px;
+    if (point->residual_px <= options_.max_residual_px && fit) {
+      vertex.state = PointState::kValid;
+      return;
+    }
+    vertex.state = PointState::kOutlier;
+    // Without the front view nothing ties the others together.
+    if (sightings.size() == 2 || point->worst == 0) return;
+    vertex.sightings.erase(vertex.sightings.begin() + point->worst);
+  }
+}
+
 RestVertex ViewMatcher::match(const SurfaceElement& element, const SurfaceElement& centre,
                               MatchScratch& scratch) const {
   RestVertex vertex;
   vertex.state = PointState::kOutside;
   const int front = frontView(centre);
   if (front < 0) return vertex;
-  const View& reference = *prepared_[front];
   const auto here = viewElement(views_[front], element);
   const auto middle = views_[front].project(centre.point_m);
   if (!here || !middle) return vertex;
-  const Mat2 tangents_from_pixel = here->pixel_from_tangents.inverse();
+  const Subset subset{*here, *middle};
   VertexSighting own{{front, here->pixel, Mat2::Zero()}, *middle};
+  vertex.sightings.push_back(own);
   for (int k = 0; k < static_cast<int>(views_.size()); ++k) {
     if (k == front || !prepared_[k]) continue;
-    const auto there = viewElement(views_[k], element);
-    const auto there_middle = views_[k].project(centre.point_m);
-    if (!there || !there_middle || !subsetInside(k, *there_middle)) continue;
-    const View& deformed = *prepared_[k];
-    CorrelatedPoint point;
-    point.position = here->pixel;
-    const SubsetWarp guess = SubsetWarp::affine(there->pixel - here->pixel,
-                                                there->pixel_from_tangents * tangents_from_pixel);
-    point.match = reference.matcher->match(deformed.spline, here->pixel, *middle, guess, scratch);
-    const MatchJudge judge(reference.ends, deformed.ends, options_.correlate);
-    point.state = judge.stateOf(point);
-    if (!point.valid()) {
-      if (vertex.sightings.empty()) vertex.state = point.state;
+    const Found found = findIn(k, front, subset, element, centre, scratch);
+    if (found.state != PointState::kValid) {
+      if (vertex.sightings.size() == 1) vertex.state = found.state;
       continue;
     }
-    // The noise of the front view's subset moves all matches alike; half of each match's variance
-    // is of that subset, and is given to its own sighting.
-    const Mat2 linear = point.match.warp.linear();
-    const Mat2 back = linear.inverse();
-    const Mat2 half = 0.5 * point.match.covariance_px2;
-    own.sighting.covariance_px2 += back * half * back.transpose();
-    const Vec2 pixel = here->pixel + point.match.warp.displacement();
-    const Vec2 moved = *middle + (linear - Mat2::Identity()) * (*middle - here->pixel) +
-                       point.match.warp.displacement();
-    vertex.sightings.push_back({{k, pixel, half}, moved});
-    vertex.zncc =
-        vertex.sightings.size() == 1 ? point.match.zncc : std::min(vertex.zncc, point.match.zncc);
+    vertex.zncc = vertex.sightings.size() == 1 ? found.zncc : std::min(vertex.zncc, found.zncc);
+    vertex.sightings.push_back(found.sighting);
+    own.sighting.covariance_px2 += found.front_covariance_px2;
   }
-  if (vertex.sightings.empty()) return vertex;
-  own.sighting.covariance_px2 /= static_cast<double>(vertex.sightings.size());
-  vertex.sightings.insert(vertex.sightings.begin(), own);
-  vertex.state = PointState::kNotFound;
-  std::vector<Sighting> sightings;
-  while (vertex.sightings.size() >= 2) {
-    sightings.clear();
-    for (const VertexSighting& s : vertex.sightings) sightings.push_back(s.sighting);
-    const auto point = triangulate(views_, sightings, &element.point_m);
-    if (!point) return vertex;
-    vertex.point = *point;
-    const bool agree = point->residual_px <= options_.max_residual_px;
-    const double freedom = 2.0 * static_cast<double>(sightings.size()) - 3.0;
-    const bool fit = point->chi2 <= kLargestChi * kLargestChi * freedom ||
-                     point->residual_px <= kFixedShare * options_.max_residual_px;
-    if (agree && fit) {
-      vertex.state = PointState::kValid;
-      return vertex;
-    }
-    vertex.state = PointState::kOutlier;
-    // Without the front view nothing ties the others together.
-    if (sightings.size() == 2 || point->worst == 0) return vertex;
-    vertex.sightings.erase(vertex.sightings.begin() + point->worst);
-  }
+  if (vertex.sightings.size() < 2) return vertex;
+  vertex.sightings.front().sighting.covariance_px2 =
+      own.sighting.covariance_px2 / static_cast<double>(vertex.sightings.size() - 1);
+  settle(element.point_m, vertex);
   return vertex;
 }
 

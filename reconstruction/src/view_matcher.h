@@ -17,6 +17,13 @@ struct SurfaceElement {
   Eigen::Matrix<double, 3, 2> tangents;  ///< Two directions along the surface, not unit.
 };
 
+/// d(pixel)/d(tangent coordinates) of a view at an element, and the pixel.
+struct ViewedElement {
+  Vec2 pixel;
+  Mat2 pixel_from_tangents;
+};
+std::optional<ViewedElement> viewElement(const CameraView& view, const SurfaceElement& element);
+
 /// Images of one moment, prepared for matching subsets between them.
 class ViewMatcher {
  public:
@@ -49,6 +56,21 @@ class ViewMatcher {
           matcher(std::make_unique<SubsetMatcher>(reference, options)) {}
   };
 
+  /// A subset of the front view: the vertex as seen there, and the subset's middle.
+  struct Subset {
+    ViewedElement seen;
+    Vec2 middle;
+  };
+  /// What a second view makes of it.
+  struct Found {
+    PointState state = PointState::kOutside;
+    VertexSighting sighting;
+    Mat2 front_covariance_px2 = Mat2::Zero();  ///< Of the front view's own sighting.
+    double zncc = 0.0;
+  };
+  Found findIn(int k, int front, const Subset& subset, const SurfaceElement& element,
+               const SurfaceElement& centre, MatchScratch& scratch) const;
+  void settle(const Vec3& guess, RestVertex& vertex) const;
   /// View whose subset around the element is inside and seen most from the front, or -1.
   int frontView(const SurfaceElement& element) const;
   bool subsetInside(int view, const Vec2& pixel) const;
@@ -57,12 +79,5 @@ class ViewMatcher {
   const SurfaceOptions& options_;
   std::vector<std::unique_ptr<View>> prepared_;  ///< Null where there is no image.
 };
-
-/// d(pixel)/d(tangent coordinates) of a view at an element, and the pixel.
-struct ViewedElement {
-  Vec2 pixel;
-  Mat2 pixel_from_tangents;
-};
-std::optional<ViewedElement> viewElement(const CameraView& view, const SurfaceElement& element);
 
 }  // namespace tenter
