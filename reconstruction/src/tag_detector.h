@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tenter/core/result.h"
+#include "tenter/core/types.h"
 #include "tenter/reconstruction/gray_image.h"
 
 namespace tenter {
