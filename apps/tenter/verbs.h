@@ -21,6 +21,7 @@ Verb sessionVerb();
 Verb rigVerb();
 Verb camerasVerb();
 Verb correlateVerb();
+Verb reconstructVerb();
 Verb demoVerb();
 Verb versionVerb();
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/video/tracking.hpp>
 
+#include "eight_bits.h"
 #include "image_checks.h"
 #include "match_checks.h"
 #include "neighbour_lists.h"
@@ -23,14 +24,6 @@ constexpr int kRecoveries = 10;
 /// grain of the texture is further away.
 constexpr double kJump_px = 2.0;
 
-cv::Mat eightBits(const GrayImage& image) {
-  const cv::Mat pixels(image.height, image.width, CV_32FC1,
-                       const_cast<float*>(image.pixels.data()));
-  cv::Mat result;
-  pixels.convertTo(result, CV_8U, 255.0 / static_cast<double>(image.white));
-  return result;
-}
-
 /// Flow at a place, that of the nearest pixel; outside that of the border.
 Vec2 flowAt(const cv::Mat& flow, const Vec2& place) {
   const auto pixel = [](double value, int size) {
@@ -43,13 +36,15 @@ Vec2 flowAt(const cv::Mat& flow, const Vec2& place) {
 }  // namespace
 
 struct PointTracker::State {
-  State(const GrayImage& image, std::vector<Vec2> tracked, const CorrelateOptions& wanted)
+  State(const GrayImage& image, std::vector<Vec2> tracked, std::vector<Vec2> subsets,
+        const CorrelateOptions& wanted)
       : options(wanted),
         reference(image),
         matcher(reference, options.match),
         ends(image),
         sharpness(sharpnessOf(image)),
         points(std::move(tracked)),
+        centres(subsets.empty() ? points : std::move(subsets)),
         neighbours(neighbourLists(points, kNeighbours)),
         last(points.size()),
         scratch(static_cast<std::size_t>(std::max(options.threads, 1))),
@@ -73,7 +68,7 @@ struct PointTracker::State {
   const SubsetMatcher matcher;
   const SaturationMap ends;
   const double sharpness;
-  const std::vector<Vec2> points;
+  const std::vector<Vec2> points, centres;
   const std::vector<std::vector<int>> neighbours;
   std::vector<SubsetWarp> last;  ///< Where each point was in the image before.
   std::vector<MatchScratch> scratch;
@@ -100,7 +95,7 @@ CorrelatedPoint PointTracker::State::matchFrom(int i, const SubsetWarp& guess,
                                                MatchScratch& memory) const {
   CorrelatedPoint point;
   point.position = points[i];
-  point.match = matcher.match(deformed, points[i], guess, memory);
+  point.match = matcher.match(deformed, points[i], centres[i], guess, memory);
   const Vec2 jump = point.match.warp.displacement() - guess.displacement();
   if (jump.norm() > kJump_px) point.match.end = MatchEnd::kDiverged;
   point.state = judge.stateOf(point);
@@ -168,10 +163,13 @@ PointTracker& PointTracker::operator=(PointTracker&&) noexcept = default;
 PointTracker::~PointTracker() = default;
 
 Result<PointTracker> PointTracker::create(const GrayImage& reference, std::vector<Vec2> points,
-                                          const CorrelateOptions& options) {
+                                          const CorrelateOptions& options,
+                                          std::vector<Vec2> centres) {
   if (auto ok = checkPair(reference, reference, options); !ok) return ok.error();
   if (auto ok = checkPoints(reference, points); !ok) return ok.error();
-  return PointTracker(std::make_unique<State>(reference, std::move(points), options));
+  require(centres.empty() || centres.size() == points.size(), "one subset a point");
+  return PointTracker(
+      std::make_unique<State>(reference, std::move(points), std::move(centres), options));
 }
 
 Result<CorrelationField> PointTracker::track(const GrayImage& image) {
@@ -195,6 +193,14 @@ Result<CorrelationField> PointTracker::track(const GrayImage& image) {
   s.previous = std::move(next);
   watch.read(field);
   return field;
+}
+
+void PointTracker::goOnFrom(const GrayImage& image, std::vector<SubsetWarp> warps) {
+  const GrayImage& first = state_->reference.image();
+  require(image.width == first.width && image.height == first.height, "images of one size");
+  require(warps.size() == state_->points.size(), "one warp a point");
+  state_->previous = eightBits(image);
+  state_->last = std::move(warps);
 }
 
 }  // namespace tenter

@@ -36,11 +36,12 @@ class Matching {
     for (auto* values : {&s_.f, &s_.gx, &s_.gy, &s_.x, &s_.y, &s_.g}) values->resize(grid.size());
   }
 
-  SubsetMatch run(const SplineImage& deformed, const Vec2& point, const SubsetWarp& guess) {
+  SubsetMatch run(const SplineImage& deformed, const Vec2& point, const Vec2& centre,
+                  const SubsetWarp& guess) {
     SubsetMatch result;
     result.warp = guess;
-    const int cx = static_cast<int>(std::lround(point.x()));
-    const int cy = static_cast<int>(std::lround(point.y()));
+    const int cx = static_cast<int>(std::lround(centre.x()));
+    const int cy = static_cast<int>(std::lround(centre.y()));
     const int r = grid_.radius;
     if (cx < r || cy < r || cx + r >= reference_.width() || cy + r >= reference_.height()) {
       result.end = MatchEnd::kOutside;
@@ -186,7 +187,7 @@ class Matching {
     return true;
   }
 
-  /// sigma^2 (J' J)^-1 at an offset from the centre.
+  /// sigma^2 (J' J)^-1 at an offset from the centre, as the warp carries it to the deformed image.
   Mat2 covarianceAt(const Vec2& offset, const SubsetWarp& warp, const SubsetMatch& match, int cx,
                     int cy) {
     const double noise = noiseVariance(warp, match, cx, cy);
@@ -194,7 +195,9 @@ class Matching {
     at.setZero();
     const auto monomials = monomialsAt(offset / grid_.radius);
     for (int k = 0; k < kTerms; ++k) at(k, 0) = at(kTerms + k, 1) = monomials[k];
-    const Mat2 random = noise / reference_.sharpness() * at.transpose() * factor_.solve(at);
+    const Mat2 here = noise / reference_.sharpness() * at.transpose() * factor_.solve(at);
+    const Mat2 linear = warp.movedBy(offset).linear();
+    const Mat2 random = linear * here * linear.transpose();
     return random + kInterpolationError_px * kInterpolationError_px * Mat2::Identity();
   }
 
@@ -244,12 +247,12 @@ SubsetMatcher::SubsetMatcher(const GradientImage& reference, const MatchOptions&
   require(usable.ok(), usable.ok() ? "" : usable.error().message());
 }
 
-SubsetMatch SubsetMatcher::match(const SplineImage& deformed, const Vec2& point,
+SubsetMatch SubsetMatcher::match(const SplineImage& deformed, const Vec2& point, const Vec2& centre,
                                  const SubsetWarp& guess, MatchScratch& scratch) const {
   if (options_.order == 1) {
-    return Matching<1>(reference_, options_, *grid_, scratch).run(deformed, point, guess);
+    return Matching<1>(reference_, options_, *grid_, scratch).run(deformed, point, centre, guess);
   }
-  return Matching<2>(reference_, options_, *grid_, scratch).run(deformed, point, guess);
+  return Matching<2>(reference_, options_, *grid_, scratch).run(deformed, point, centre, guess);
 }
 
 }  // namespace tenter

@@ -59,7 +59,14 @@ class SubsetMatcher {
 
   /// Matches the subset around the pixel nearest to `point` [px], from `guess` around the point.
   SubsetMatch match(const SplineImage& deformed, const Vec2& point, const SubsetWarp& guess,
-                    MatchScratch& scratch) const;
+                    MatchScratch& scratch) const {
+    return match(deformed, point, point, guess, scratch);
+  }
+
+  /// The same with the subset around the pixel nearest to `centre`: for points beside an edge,
+  /// whose own subset would see beyond it. Guess and result are around the point.
+  SubsetMatch match(const SplineImage& deformed, const Vec2& point, const Vec2& centre,
+                    const SubsetWarp& guess, MatchScratch& scratch) const;
 
  private:
   const GradientImage& reference_;

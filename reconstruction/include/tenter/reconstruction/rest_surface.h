@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tenter/core/mesh.h"
+#include "tenter/reconstruction/correlate.h"
+#include "tenter/reconstruction/triangulate.h"
+
+namespace tenter {
+
+struct SurfaceOptions {
+  CorrelateOptions correlate;  ///< Of subsets between views and between frames.
+  /// A vertex whose sightings lie farther from its projections is not valid [px RMS].
+  double max_residual_px = 0.5;
+  int vertices_per_side = 100;  ///< Of the longer side of the mesh.
+};
+
+/// A sighting of a vertex and the middle of the subset by which it is found again.
+struct VertexSighting {
+  Sighting sighting;
+  Vec2 centre = Vec2::Zero();
+};
+
+/// A vertex of the mesh at rest.
+struct RestVertex {
+  PointState state = PointState::kNotFound;
+  SpacePoint point;                       ///< If valid.
+  std::vector<VertexSighting> sightings;  ///< The views that show it; at least two if valid.
+  double zncc = 0.0;                      ///< Least of those between views.
+};
+
+/// The surface at rest and what is needed to follow it.
+struct RestSurface {
+  TriangleMesh mesh;  ///< In space, with (u, v) [m].
+  std::vector<RestVertex> vertices;
+  int columns = 0, rows = 0;  ///< Of the whole grid; the mesh may hold a part of it.
+  std::vector<int> node_of_vertex;
+  double pixel_m = 0.0;      ///< What a pixel covers, the median.
+  double residual_px = 0.0;  ///< Median over valid vertices.
+  double inflation = 1.0;    ///< What sightings' sigmas fall short of their residuals, at least 1.
+  std::vector<std::string> warnings;
+
+  std::size_t validCount() const;
+};
+
+/// The part of a sheet to be meshed: nodes origin + (i, j) spacing in the sheet's plane.
+struct SheetGrid {
+  Eigen::Isometry3d space_from_sheet = Eigen::Isometry3d::Identity();
+  Vec2 origin_m = Vec2::Zero(), spacing_m = Vec2::Zero();
+  int columns = 0, rows = 0;
+  /// Whether the cloth can be seen at a place of the sheet [m]: subsets stay where it can.
+  std::function<bool(const Vec2&)> free;
+  double margin_m = 0.0;  ///< How much `free` may err outwards.
+  /// Whether subsets of vertices near what is not free are moved to where all is free; otherwise
+  /// such vertices are left out.
+  bool to_the_edge = false;
+  /// Material coordinates of a place.
+  std::function<Vec2(const Vec2&)> uv;
+
+  Vec2 place(int node) const {
+    return origin_m + Vec2(node % columns, node / columns).cwiseProduct(spacing_m);
+  }
+};
+
+/// Surface from images of one moment without any knowledge of where it lies: semi-global matching
+/// finds it, subsets between views refine it. (u, v) are coordinates in the plane nearest to the
+/// surface, u as the columns of the first view run, from the mesh's corner. Views with an empty
+/// image are left out. `inside` (may be empty) says which pixels of the first view count. Error
+/// (without a file): nothing in common between the views, texture that repeats, too few vertices.
+Result<RestSurface> findSurface(const std::vector<CameraView>& views,
+                                const std::vector<GrayImage>& images, const SurfaceOptions& options,
+                                const std::function<bool(const Vec2&)>& inside = {});
+
+/// The same on a grid that is given: a sheet that lies near its plane.
+Result<RestSurface> findSheet(const std::vector<CameraView>& views,
+                              const std::vector<GrayImage>& images, const SurfaceOptions& options,
+                              const SheetGrid& grid);
+
+}  // namespace tenter

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "sheet_heights.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tenter {
+
+namespace {
+
+/// What a vertex may depart from the median of its neighbours, which their slopes carry to it: in
+/// their spread, in its sigma and in pixels.
+constexpr double kSpreads = 5.0, kSigmas = 5.0, kFixed_px = 0.15;
+constexpr std::size_t kLeastNeighbours = 3;
+
+double medianOf(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+SheetHeights::SheetHeights(const SheetGrid& grid, const HeightField& coarse)
+    : grid_(grid),
+      heights_(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows)),
+      known_(heights_.size()) {
+  for (int node = 0; node < static_cast<int>(heights_.size()); ++node) {
+    const auto tangent = coarse.at(grid.place(node));
+    if (!tangent) continue;
+    heights_[node] = tangent->height_m;
+    known_[node] = 1;
+  }
+  fill();
+}
+
+std::vector<int> SheetHeights::around(int node, int reach) const {
+  const int column = node % grid_.columns, row = node / grid_.columns;
+  std::vector<int> nodes;
+  for (int r = std::max(row - reach, 0); r <= std::min(row + reach, grid_.rows - 1); ++r) {
+    for (int c = std::max(column - reach, 0); c <= std::min(column + reach, grid_.columns - 1);
+         ++c) {
+      const int other = r * grid_.columns + c;
+      if (other != node && known(other)) nodes.push_back(other);
+    }
+  }
+  return nodes;
+}
+
+Vec2 SheetHeights::slope(int node) const {
+  const int column = node % grid_.columns, row = node / grid_.columns;
+  const auto along = [&](int place, int count, int stride, double spacing) {
+    const bool ahead = place + 1 < count && known(node + stride);
+    const bool behind = place > 0 && known(node - stride);
+    const int steps = static_cast<int>(ahead) + static_cast<int>(behind);
+    if (steps == 0) return 0.0;
+    const double rise =
+        heights_[ahead ? node + stride : node] - heights_[behind ? node - stride : node];
+    return rise / (steps * spacing);
+  };
+  return {along(column, grid_.columns, 1, grid_.spacing_m.x()),
+          along(row, grid_.rows, grid_.columns, grid_.spacing_m.y())};
+}
+
+double SheetHeights::extrapolated(int column, int row) const {
+  if (column < 0) return 2.0 * extrapolated(0, row) - extrapolated(1, row);
+  if (row < 0) return 2.0 * extrapolated(column, 0) - extrapolated(column, 1);
+  const int last_column = grid_.columns - 1, last_row = grid_.rows - 1;
+  if (column > last_column) {
+    return 2.0 * extrapolated(last_column, row) - extrapolated(last_column - 1, row);
+  }
+  if (row > last_row) {
+    return 2.0 * extrapolated(column, last_row) - extrapolated(column, last_row - 1);
+  }
+  return heights_[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid_.columns) + column];
+}
+
+int SheetHeights::nodeNear(const Vec2& place_m) const {
+  const Vec2 cell = (place_m - grid_.origin_m).cwiseQuotient(grid_.spacing_m);
+  const int column = std::clamp(static_cast<int>(std::lround(cell.x())), 0, grid_.columns - 1);
+  const int row = std::clamp(static_cast<int>(std::lround(cell.y())), 0, grid_.rows - 1);
+  return row * grid_.columns + column;
+}
+
+SurfaceElement SheetHeights::elementAt(const Vec2& place_m) const {
+  const int node = nodeNear(place_m);
+  const Vec2 rise = slope(node);
+  const double height = heights_[node] + rise.dot(place_m - grid_.place(node));
+  const Mat3& turn = grid_.space_from_sheet.linear();
+  SurfaceElement element;
+  element.point_m = grid_.space_from_sheet * Vec3(place_m.x(), place_m.y(), height);
+  element.tangents.col(0) = turn * Vec3(1.0, 0.0, rise.x());
+  element.tangents.col(1) = turn * Vec3(0.0, 1.0, rise.y());
+  return element;
+}
+
+void SheetHeights::refine(std::vector<RestVertex>& vertices, double pixel_m) {
+  const Eigen::Isometry3d sheet_from_space = grid_.space_from_sheet.inverse();
+  const SheetHeights before = *this;
+  for (int node = 0; node < static_cast<int>(vertices.size()); ++node) {
+    known_[node] = 0;
+    if (vertices[node].state != PointState::kValid) continue;
+    const Vec3 at = sheet_from_space * vertices[node].point.position_m;
+    const Vec2 off = at.head<2>() - grid_.place(node);
+    heights_[node] = at.z() - before.slope(node).dot(off);
+    known_[node] = 1;
+  }
+  dropOutliers(vertices, pixel_m);
+  fill();
+}
+
+void SheetHeights::dropOutliers(std::vector<RestVertex>& vertices, double pixel_m) {
+  std::vector<int> outliers;
+  for (int node = 0; node < static_cast<int>(vertices.size()); ++node) {
+    if (!known(node)) continue;
+    std::vector<double> predicted;
+    for (const int other : around(node, 2)) {
+      predicted.push_back(heights_[other] +
+                          slope(other).dot(grid_.place(node) - grid_.place(other)));
+    }
+    bool good = predicted.size() >= kLeastNeighbours;
+    if (good) {
+      const double centre = medianOf(predicted);
+      for (double& value : predicted) value = std::abs(value - centre);
+      const double sigma = std::sqrt(vertices[node].point.covariance_m2.trace());
+      const double allowed = kSpreads * medianOf(predicted) + kSigmas * sigma + kFixed_px * pixel_m;
+      good = std::abs(heights_[node] - centre) <= allowed;
+    }
+    if (!good) outliers.push_back(node);
+  }
+  for (const int node : outliers) {
+    known_[node] = 0;
+    vertices[node].state = PointState::kOutlier;
+  }
+}
+
+/// Grows the known nodes outwards, each new one where the planes of those around it lead.
+void SheetHeights::fill() {
+  for (bool grown = true; grown;) {
+    const SheetHeights before = *this;
+    grown = false;
+    for (int node = 0; node < static_cast<int>(heights_.size()); ++node) {
+      if (before.known(node)) continue;
+      const std::vector<int> near = before.around(node, 1);
+      if (near.size() < 2) continue;
+      double sum = 0.0;
+      for (const int other : near) {
+        sum += before.heights_[other] +
+               before.slope(other).dot(grid_.place(node) - grid_.place(other));
+      }
+      heights_[node] = sum / static_cast<double>(near.size());
+      known_[node] = 1;
+      grown = true;
+    }
+  }
+}
+
+}  // namespace tenter
