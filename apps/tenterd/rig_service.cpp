@@ -389,6 +389,18 @@ void RigService::publish(const RigTick& tick) {
                                {"longest_scan_ms", 1e-6 * static_cast<double>(scans.longest_ns)},
                                {"fault", cell.fault}});
   }
+  status["mapping"] = nlohmann::json::array();
+  for (const MappingFinding& finding : machine_.mapping()) {
+    nlohmann::json answered;
+    if (finding.answered) answered = config_.cells[static_cast<std::size_t>(*finding.answered)].id;
+    status["mapping"].push_back(
+        {{"axis", config_.axes[static_cast<std::size_t>(finding.axis)].device.name},
+         {"cell", config_.cells[static_cast<std::size_t>(finding.cell)].id},
+         {"answered", answered},
+         {"confirmed", finding.confirmed()},
+         {"rise_N", finding.rise_N},
+         {"text", mappingText(finding, config_)}});
+  }
   status["time_ns"] = tick.time_ns;
   status["loop"] = {{"ticks", ticks_},
                     {"overlong_calls", overlong_.load()},

@@ -33,7 +33,8 @@ void RigMachine::begin(Activity activity) {
     const AxisConfig& axis = config_.axes[i].device;
     setpoints_m_[i] = std::clamp(known_m_[i], axis.travel_min_m, axis.travel_max_m);
   }
-  if (!protocol_ && activity == Activity::kJog) origins_m_ = known_m_;
+  const bool on_its_own = activity == Activity::kJog || activity == Activity::kMap;
+  if (!protocol_ && on_its_own) origins_m_ = known_m_;
   history_N_.clear();
   history_ns_.clear();
 }
@@ -87,6 +88,8 @@ void RigMachine::act() {
       return actUnload();
     case Activity::kRun:
       return actRun();
+    case Activity::kMap:
+      return actMap();
   }
 }
 
@@ -239,6 +242,22 @@ void RigMachine::leaveStep() {
   endRun("done");
   changeState(RigState::kRunning, "unloading");
   startUnloading();
+}
+
+void RigMachine::startProtocol() {
+  phase_ = step_ = 0;
+  cycle_ = 0;
+  captures_ = 0;
+  next_capture_ns_ = tick_->time_ns;
+  changeState(RigState::kRunning, "protocol " + protocol_->name);
+  begin(Activity::kRun);
+  origins_m_ = known_m_;
+  loading_ = true;
+  decide("run",
+         nlohmann::json{
+             {"protocol", protocol_->name}, {"tares_N", tares_N_}, {"origins_m", origins_m_}}
+             .dump());
+  enterStep();
 }
 
 void RigMachine::endRun(const std::string& how) {
