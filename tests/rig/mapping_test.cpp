@@ -57,12 +57,12 @@ TEST(MappingTest, CrossedCellsAreNamedAndRefuseTheRun) {
 
   ASSERT_EQ(running.tenterRig({"reset"}), 0);
   EXPECT_EQ(running.tenterRig({"check-mapping", "axis-3"}), 0) << "that one is right";
-  EXPECT_EQ(
-      running.tenterRig({"run", protocol, "-o", running.path("skipped"), "--skip-mapping-check"}),
-      0);
+  // It may well end in a fault: with crossed cells a cord is let out by another's tension.
+  (void)running.tenterRig({"run", protocol, "-o", running.path("skipped"), "--skip-mapping-check"});
   EventLog skipped;
   ASSERT_TRUE(replaySession(running.path("skipped"), {}, skipped).ok());
   EXPECT_THAT(skipped.text(), HasSubstr("\"name\":\"mapping-check-skipped\""));
+  EXPECT_THAT(skipped.text(), HasSubstr("\"name\":\"capture\""));
 }
 
 }  // namespace
