@@ -130,7 +130,7 @@ Result<int> RigVisit::run(const RigRun& run) {
   console_.answer["session"] = run.session;
   const std::string fault = status->value("session", Json::object()).value("fault", "");
   if (!fault.empty()) return Error{ErrorKind::kHardware, run.session, "", fault, ""};
-  tellMapping(*status, false);
+  if (status->value("reason", "") == "rig: mapping") tellMapping(*status, false);
   return ended(Json::object(), *status);
 }
 

@@ -62,6 +62,7 @@ SessionHeader headerFrom(JsonReader& in, const CaptureProtocol& protocol, const 
   header.protocol = protocol.name;
   header.protocol_text = protocol.text;
   header.rig_configuration = rig.text;
+  header.calibration_ids = rig.calibration_ids;
   for (const RigAxis& axis : rig.axes) header.actuators.push_back(axis.device.name);
   for (const LoadCellConfig& cell : rig.cells) header.cells.push_back(cell.id);
   return header;

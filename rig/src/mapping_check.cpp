@@ -94,16 +94,16 @@ MappingCheck::Move MappingCheck::step(double dt_s, const std::vector<double>& se
   for (const auto& tension_N : tensions_N) {
     if (tension_N) known_N.push_back(*tension_N);
   }
-  if (known_N.size() != rest_N_.size()) return {axis, 0.0};
+  if (known_N.size() != rest_N_.size()) return {axis, 0.0, std::nullopt};
   elapsed_s_ += dt_s;
   switch (stage_) {
     case Stage::kRest:
       if (rest(known_N, setpoint_m)) begin(Stage::kDraw);
-      return {axis, 0.0};
+      return {axis, 0.0, std::nullopt};
     case Stage::kDraw:
-      if (const auto speed = draw(dt_s, known_N, setpoint_m)) return {axis, *speed};
+      if (const auto speed = draw(dt_s, known_N, setpoint_m)) return {axis, *speed, std::nullopt};
       begin(Stage::kReturn);
-      return {axis, 0.0};
+      return {axis, 0.0, std::nullopt};
     case Stage::kReturn:
       break;
   }
@@ -111,10 +111,10 @@ MappingCheck::Move MappingCheck::step(double dt_s, const std::vector<double>& se
   if (left_m <= kArrived_m) {
     ++next_;
     begin(Stage::kRest);
-    return {axis, 0.0};
+    return {axis, 0.0, std::nullopt};
   }
   const double most_m_per_s = trials_[next_].max_speed_m_per_s;
-  return {axis, dt_s > 0.0 ? -std::min(most_m_per_s, left_m / dt_s) : 0.0};
+  return {axis, dt_s > 0.0 ? -std::min(most_m_per_s, left_m / dt_s) : 0.0, rest_m_};
 }
 
 }  // namespace tenter

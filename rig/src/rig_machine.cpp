@@ -95,6 +95,8 @@ RigOrders RigMachine::step(const RigTick& tick) {
           "RigMachine: one input for each axis and cell");
   RigOrders orders;
   orders.targets_m.resize(config_.axes.size());
+  orders.speeds_m_per_s.resize(config_.axes.size());
+  goals_m_.assign(config_.axes.size(), std::nullopt);
   tick_ = &tick;
   orders_ = &orders;
   remember();

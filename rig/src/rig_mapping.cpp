@@ -61,6 +61,7 @@ void RigMachine::actMap() {
   if (mapping_->done()) return mappingDone();
   std::vector<double> velocities(config_.axes.size(), 0.0);
   velocities[static_cast<std::size_t>(wanted.axis)] = wanted.velocity_m_per_s;
+  goals_m_[static_cast<std::size_t>(wanted.axis)] = wanted.goal_m;
   move(velocities);
 }
 

@@ -35,6 +35,7 @@ class MappingCheck {
   struct Move {
     int axis = 0;
     double velocity_m_per_s = 0.0;  ///< 0: nothing moves in this tick.
+    std::optional<double> goal_m;   ///< Where the motion is to end exactly.
   };
   /// `dt_s` since the tick before; setpoints of all axes, gross tensions of all cells. A tick
   /// without all tensions counts for nothing. Precondition: !done().

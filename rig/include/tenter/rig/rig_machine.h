@@ -102,8 +102,11 @@ struct RigOrders {
   bool halt = false;          ///< All axes at once, without a ramp.
   bool release_halt = false;  ///< Orders that move may be sent again.
   bool energise = false, deenergise = false, home = false;
-  std::vector<std::optional<double>> targets_m;  ///< Nothing: the axis is only kept alive.
-  std::vector<RecordBody> records;               ///< Decisions, states, faults, phases.
+  /// Nothing: the axis is only kept alive. One tick ahead of where the axis should be, so that it
+  /// does not stop before it is told to go on.
+  std::vector<std::optional<double>> targets_m;
+  std::vector<double> speeds_m_per_s;  ///< With which the targets are to be gone for.
+  std::vector<RecordBody> records;     ///< Decisions, states, faults, phases.
   std::vector<RigAnswer> answers;
   bool run_ended = false;  ///< Unloading included: the session may be closed.
 };
@@ -219,6 +222,7 @@ class RigMachine {
   std::int64_t since_ns_ = 0;  ///< When the activity began.
   bool enabled_ = false, emergency_ = false, loading_ = false, recording_ = false;
   std::vector<double> setpoints_m_, origins_m_;  ///< Origins: where the run began.
+  std::vector<std::optional<double>> goals_m_;   ///< Where this tick's motion is to end exactly.
   std::vector<double> begun_m_;                  ///< Where the activity began.
   std::vector<double> known_m_;                  ///< Last positions read.
   std::vector<double> tares_N_, tare_sums_N_;
