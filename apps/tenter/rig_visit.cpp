@@ -116,7 +116,8 @@ Result<int> RigVisit::run(const RigRun& run) {
                    {"specimen", run.specimen},
                    {"who", run.who},
                    {"operator", run.operator_name},
-                   {"areal_density_kg_per_m2", run.areal_density_kg_per_m2}});
+                   {"areal_density_kg_per_m2", run.areal_density_kg_per_m2},
+                   {"skip_mapping_check", run.skip_mapping_check}});
   if (!started) return started.error();
   auto status = wait(run.protocol_name);
   if (!status) return status.error();
@@ -129,7 +130,18 @@ Result<int> RigVisit::run(const RigRun& run) {
   console_.answer["session"] = run.session;
   const std::string fault = status->value("session", Json::object()).value("fault", "");
   if (!fault.empty()) return Error{ErrorKind::kHardware, run.session, "", fault, ""};
+  if (status->value("reason", "") == "rig: mapping") tellMapping(*status, false);
   return ended(Json::object(), *status);
+}
+
+void RigVisit::tellMapping(const Json& status, bool all) {
+  const Json findings = status.value("mapping", Json::array());
+  console_.answer["mapping"] = findings;
+  for (const Json& finding : findings) {
+    const bool confirmed = finding.value("confirmed", false);
+    if (confirmed && all) console_.say("  " + finding.value("text", ""));
+    if (!confirmed) console_.warn("  " + finding.value("text", ""));
+  }
 }
 
 Result<int> RigVisit::ended(const Json& before, const Json& status) {

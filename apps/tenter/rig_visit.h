@@ -17,6 +17,7 @@ struct RigRun {
   std::string session;  ///< Folder to be made.
   std::string fabric, specimen, who, operator_name;
   double areal_density_kg_per_m2 = 0.0;
+  bool skip_mapping_check = false;  ///< The session says so.
 };
 
 /// One operator's visit to tenterd: holds the lease while it lasts.
@@ -34,6 +35,8 @@ class RigVisit {
   Result<void> homeIfLost();
   /// Enables, homes if it must, runs a protocol, and waits until its session is closed.
   Result<int> run(const RigRun& run);
+  /// Which cell each axis that was tried has pulled, for the answer and for a person.
+  void tellMapping(const nlohmann::json& status, bool all);
   /// Says what the visit ended in: exit 7 if a limit or a person ended the motion, not if the rig
   /// is as halted as it was before.
   Result<int> ended(const nlohmann::json& before, const nlohmann::json& status);

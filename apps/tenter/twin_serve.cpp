@@ -33,6 +33,12 @@ void declare(CLI::App& command, Options& o) {
       ->capture_default_str();
   command.add_option("--specimen", o.rig.mount.specimen, "Number of the piece; 0: as the seed")
       ->capture_default_str();
+  command
+      .add_option("--clips", o.rig.mount.clips,
+                  "free: the sample hangs on them; held: fixed, so that cords alone give way; "
+                  "unhooked: every cord is on a spring at the frame")
+      ->check(CLI::IsMember({"free", "held", "unhooked"}))
+      ->capture_default_str();
   command.add_option("--nodes", o.rig.mount.nodes, "Nodes a side of the simulated sheet")
       ->capture_default_str();
 }

@@ -12,7 +12,7 @@ namespace {
 constexpr double kMilli = 1e3;
 
 struct Options {
-  std::string session, mount, output;
+  std::string session, mount, output, cords;
   int nodes = 0;
 };
 
@@ -21,6 +21,7 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--mount", o.mount, "mount.json of the rig's state folder")->required();
   command.add_option("--nodes", o.nodes, "Nodes a side of the sheet; 0: as in the rig")
       ->capture_default_str();
+  command.add_option("--cords", o.cords, "Take friction off by this calibration of the cords, too");
   command.add_option("-o,--output", o.output, "CSV of all samples beside the truth");
 }
 
@@ -46,10 +47,15 @@ Result<int> run(const Options& o, Console& console) {
   if (!mount) return mount.error();
   Progress progress(console);
   SessionTruthOptions options{
-      o.session, *mount, interrupted, [&](double time_s) {
+      o.session, *mount, std::nullopt, interrupted, [&](double time_s) {
         progress.show(-1.0, std::to_string(static_cast<int>(time_s)) + " s of the session");
       }};
   if (o.nodes != 0) options.mount.nodes = o.nodes;
+  if (!o.cords.empty()) {
+    auto cords = readCordCalibration(o.cords);
+    if (!cords) return cords.error();
+    options.cords = *std::move(cords);
+  }
   const auto truth = truthOfSession(options);
   if (!truth) return truth.error();
   if (!o.output.empty()) {
@@ -60,6 +66,7 @@ Result<int> run(const Options& o, Console& console) {
                     {"nodes", options.mount.nodes},
                     {"solves", truth->solves},
                     {"cords", nlohmann::json::array()}};
+  if (truth->rms_by_cords_N) console.answer["rms_by_cords_N"] = *truth->rms_by_cords_N;
   for (const CordAgreement& cord : truth->cords) {
     console.answer["cords"].push_back({{"axis", cord.axis},
                                        {"cord", cord.cord},
@@ -70,6 +77,9 @@ Result<int> run(const Options& o, Console& console) {
                                        {"largest_N", cord.largest_N},
                                        {"highest_N", cord.highest_N},
                                        {"way_m", cord.way_m}});
+    if (cord.rms_by_cords_N) {
+      console.answer["cords"].back()["rms_by_cords_N"] = *cord.rms_by_cords_N;
+    }
     console.say(cord.axis + " (" + (cord.cord.empty() ? "no cord" : cord.cord) +
                 "): " + millinewtons(cord.rms_N) + " RMS, bias " + millinewtons(cord.bias_N));
   }

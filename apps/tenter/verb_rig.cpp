@@ -22,6 +22,8 @@ struct Options {
   std::string protocol, output, fabric = "unknown", specimen = "unknown", who = "unknown",
                                 operator_name = "unknown";
   double areal_density_kg_per_m2 = 0.2;
+  bool skip_mapping_check = false;
+  std::vector<std::string> axes;
 };
 
 void declareSocket(CLI::App& command, Options& o) {
@@ -44,6 +46,13 @@ void declareRun(CLI::App& command, Options& o) {
   command.add_option("--who", o.who, "Whom the data belong to")->capture_default_str();
   command.add_option("--operator", o.operator_name, "Who is at the bench")->capture_default_str();
   command.add_option("--areal-density", o.areal_density_kg_per_m2, "kg/m2")->capture_default_str();
+  command.add_flag("--skip-mapping-check", o.skip_mapping_check,
+                   "Begin without having seen that each axis pulls its own cell; it is recorded");
+}
+
+void declareCheckMapping(CLI::App& command, Options& o) {
+  declareSocket(command, o);
+  command.add_option("axes", o.axes, "Axes to try; without, all that have a cell");
 }
 
 std::string numberText(const Json& value, const char* unit) {
@@ -132,7 +141,21 @@ Result<int> run(const Options& o, Console& console) {
   const auto visit = RigVisit::begin(o.socket->as<std::string>(), console);
   if (!visit) return visit.error();
   return (*visit)->run({*text, o.protocol, o.output, o.fabric, o.specimen, o.who, o.operator_name,
-                        o.areal_density_kg_per_m2});
+                        o.areal_density_kg_per_m2, o.skip_mapping_check});
+}
+
+Result<int> checkMapping(const Options& o, Console& console) {
+  const auto visit = RigVisit::begin(o.socket->as<std::string>(), console);
+  if (!visit) return visit.error();
+  if (auto up = (*visit)->enable(); !up) return up.error();
+  if (auto homed = (*visit)->homeIfLost(); !homed) return homed.error();
+  const auto before = (*visit)->call("status");
+  if (!before) return before.error();
+  if (auto done = (*visit)->call("check-mapping", {{"axes", o.axes}}); !done) return done.error();
+  const auto status = (*visit)->wait("check-mapping");
+  if (!status) return status.error();
+  (*visit)->tellMapping(*status, true);
+  return (*visit)->ended(*before, *status);
 }
 
 template <const char* kMethod>
@@ -174,6 +197,10 @@ Verb rigVerb() {
       rigSnap(),
       Verb{"jog", "Move one axis",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareJog, jog); }},
+      Verb{"check-mapping", "Draw in each axis a little: is it its own cell that answers?",
+           [](CLI::App& c, Action& a) {
+             setUpCommand<Options>(c, a, declareCheckMapping, checkMapping);
+           }},
       Verb{"run", "Run a protocol and record the session; homes first if it must",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareRun, run); }}};
   return {"rig", "The rig, through tenterd", [](CLI::App& command, Action& action) {

@@ -2,6 +2,7 @@
 #include <array>
 
 #include "output_guard.h"
+#include "session_forces.h"
 #include "tenter/session/session_export.h"
 #include "tenter/session/session_reader.h"
 #include "tenter/session/session_writer.h"
@@ -140,6 +141,7 @@ Verb sessionVerb() {
       Verb{"repair", "Cut a torn tail off, keep it beside, and say what it was",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSession, repair); }},
       sessionReplay(),
+      sessionForces(),
       Verb{"export", "Write a session for other programs",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareExport, exportTo); }}};
   return {"session", "Recorded sessions", [](CLI::App& command, Action& action) {

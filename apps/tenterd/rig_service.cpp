@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace tenter::daemon {
 namespace {
@@ -16,6 +17,7 @@ constexpr auto kWatchPeriod = 2ms;
 constexpr Actuator::Timeout kDeviceTimeout{40}, kEnergiseTimeout{100}, kConnectTimeout{500};
 constexpr auto kAnswerLimit = 2s;
 constexpr auto kQuitLimit = 30s;
+constexpr double kSameSpeedShare = 0.02;
 constexpr std::int64_t kReconnectPeriod_ns = 1'000'000'000;
 
 /// What keeps an axis from being moved, though it answers. A late order is cured by the next one.
@@ -71,6 +73,7 @@ RigService::RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<Cell
       scanner_(std::move(scanner)),
       cameras_(std::move(cameras)),
       machine_(std::move(config)),
+      speeds_m_per_s_(config_.axes.size(), 0.0),
       status_{{"rig", config_.name},
               {"state", rigStateName(machine_.state())},
               {"reason", "has not been read yet"},
@@ -282,8 +285,37 @@ void RigService::obey(const RigOrders& orders) {
     }
     if (orders.home) note({bank_.axis(i).goHome(HomeTowards::kMin, kEnergiseTimeout)});
   }
+  if (orders.energise || orders.home) speeds_m_per_s_.assign(config_.axes.size(), 0.0);
+  limitSpeeds(orders);
   note(timed("targets", kDeviceTimeout,
              [&] { return bank_.setTargets(orders.targets_m, kDeviceTimeout); }));
+}
+
+/// Devices go at the speed that is wanted instead of hurrying to each tick's target and waiting
+/// there. They are told only what is new.
+void RigService::limitSpeeds(const RigOrders& orders) {
+  std::vector<std::optional<double>> speeds_m_per_s(config_.axes.size());
+  bool any = false;
+  for (std::size_t i = 0; i < speeds_m_per_s.size(); ++i) {
+    const double speed_m_per_s = orders.speeds_m_per_s[i];
+    const bool same =
+        std::abs(speed_m_per_s - speeds_m_per_s_[i]) <= kSameSpeedShare * speeds_m_per_s_[i];
+    if (!orders.targets_m[i] || speed_m_per_s <= 0.0 || same) continue;
+    speeds_m_per_s_[i] = speed_m_per_s;
+    speeds_m_per_s[i] = speed_m_per_s;
+    any = true;
+  }
+  if (!any) return;
+  for (const AxisOutcome& outcome : timed("speeds", kDeviceTimeout, [&] {
+         return bank_.setSpeedLimits(speeds_m_per_s, kDeviceTimeout);
+       })) {
+    if (outcome.ok()) continue;
+    const auto axis = config_.findAxis(outcome.axis);
+    // A speed that the device does not have is no fault: it then keeps the one that it had.
+    if (outcome.fault == ActuatorFault::kOutOfRange) continue;
+    if (axis) speeds_m_per_s_[static_cast<std::size_t>(*axis)] = 0.0;
+    note({outcome});
+  }
 }
 
 /// Orders that were not carried out. Those that a halt forbids or cuts short are as they should be.
@@ -396,11 +428,26 @@ void RigService::publish(const RigTick& tick) {
     status["cells"].push_back({{"name", config_.cells[i].id},
                                {"gross_N", numberOrNull(cell.gross_N)},
                                {"net_N", net_N},
+                               {"gain", config_.cells[i].gain},
+                               {"offset_N", config_.cells[i].offset_N},
                                {"age_ms", 1e-6 * static_cast<double>(cell.age_ns)},
                                {"scan_ms", 1e-6 * static_cast<double>(scans.mean_ns)},
                                {"longest_scan_ms", 1e-6 * static_cast<double>(scans.longest_ns)},
                                {"fault", cell.fault}});
   }
+  status["mapping"] = nlohmann::json::array();
+  for (const MappingFinding& finding : machine_.mapping()) {
+    nlohmann::json answered;
+    if (finding.answered) answered = config_.cells[static_cast<std::size_t>(*finding.answered)].id;
+    status["mapping"].push_back(
+        {{"axis", config_.axes[static_cast<std::size_t>(finding.axis)].device.name},
+         {"cell", config_.cells[static_cast<std::size_t>(finding.cell)].id},
+         {"answered", answered},
+         {"confirmed", finding.confirmed()},
+         {"rise_N", finding.rise_N},
+         {"text", mappingText(finding, config_)}});
+  }
+  status["calibration_ids"] = config_.calibration_ids;
   status["time_ns"] = tick.time_ns;
   status["loop"] = {{"ticks", ticks_},
                     {"overlong_calls", overlong_.load()},

@@ -67,6 +67,7 @@ class RigService {
   void obey(const RigOrders& orders);
   std::vector<AxisOutcome> haltEverything();
   void release();
+  void limitSpeeds(const RigOrders& orders);
   void attach(const RigOrders& orders, const RigMemory& before);
   void record(const RigTick& tick, const RigOrders& orders);
   template <class Call>
@@ -86,6 +87,7 @@ class RigService {
   std::atomic<bool> quitting_{false}, operated_{false}, armed_{false}, operator_changed_{false};
   /// A device did not confirm that it halted: it is told again, and not kept alive meanwhile.
   std::atomic<bool> halt_again_{false};
+  std::vector<double> speeds_m_per_s_;  ///< As the devices were told; 0: not known.
 
   std::mutex halt_mutex_;  ///< Of what halts from outside the loop.
   std::optional<ForceTrip> trip_;

@@ -64,6 +64,7 @@ SessionHeader headerFrom(JsonReader& in, const CaptureProtocol& protocol, const 
   header.protocol = protocol.name;
   header.protocol_text = protocol.text;
   header.rig_configuration = rig.text;
+  header.calibration_ids = rig.calibration_ids;
   for (const RigAxis& axis : rig.axes) header.actuators.push_back(axis.device.name);
   for (const LoadCellConfig& cell : rig.cells) header.cells.push_back(cell.id);
   return header;
@@ -130,7 +131,9 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
     return Error{ErrorKind::kInterlock, "", "", "this client does not operate the rig", ""};
   }
   const PlainRow* row = findPlain(method);
-  if (row == nullptr && method != "jog" && method != "run") {
+  const bool known =
+      row != nullptr || method == "jog" || method == "run" || method == "check-mapping";
+  if (!known) {
     return usageError("there is no method \"" + method + "\"");
   }
   const bool beside =
@@ -141,6 +144,7 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
   }
   spdlog::info("{} by {}", method, client.user);
   if (row != nullptr) return plain(row->kind);
+  if (method == "check-mapping") return checkMapping(params);
   return method == "jog" ? jog(params) : run(params, client);
 }
 
@@ -165,6 +169,22 @@ Result<Json> Rpc::frames(std::vector<Descriptor>& attached) {
 Result<Json> Rpc::plain(Kind kind) {
   RigCommand command;
   command.kind = kind;
+  if (auto done = service_.command(command); !done) return done.error();
+  return Json::object();
+}
+
+Result<Json> Rpc::checkMapping(const Json& params) {
+  JsonReader in(params, "params");
+  RigCommand command;
+  command.kind = Kind::kCheckMapping;
+  const std::vector<std::string> names =
+      in.has("axes") ? in.texts("axes") : std::vector<std::string>();
+  for (const std::string& name : names) {
+    const auto axis = service_.config().findAxis(name);
+    if (!axis) in.fail("axes", "there is no axis \"" + name + "\"");
+    command.axes.push_back(axis.value_or(0));
+  }
+  if (!in.ok()) return in.error();
   if (auto done = service_.command(command); !done) return done.error();
   return Json::object();
 }
@@ -195,6 +215,7 @@ Result<Json> Rpc::run(const Json& params, const Client& client) {
   const auto protocol = parseCaptureProtocol(text, "protocol");
   if (!protocol) return protocol.error();
   if (auto fits = checkAgainstRig(*protocol, service_.config()); !fits) return fits.error();
+  const bool skip_mapping = in.has("skip_mapping_check") && in.boolean("skip_mapping_check");
   const SessionHeader header = headerFrom(in, *protocol, service_.config());
   if (!in.ok()) return in.error();
   if (auto seen = service_.cameras().awaitAll(kCamerasLimit); !seen) return seen.error();
@@ -207,6 +228,7 @@ Result<Json> Rpc::run(const Json& params, const Client& client) {
   RigCommand command;
   command.kind = Kind::kRun;
   command.protocol = std::make_shared<CaptureProtocol>(*protocol);
+  command.mapping = skip_mapping ? RigCommand::Mapping::kSkip : RigCommand::Mapping::kCheck;
   auto recorder = std::make_shared<Recorder>(*std::move(writer), monotonic_ns());
   auto done = still_operates ? service_.command(command, recorder)
                              : Error{ErrorKind::kInterlock, "", "",

@@ -36,6 +36,7 @@ class Rpc {
   Result<nlohmann::json> status() const;
   Result<nlohmann::json> frames(std::vector<Descriptor>& attached);
   Result<nlohmann::json> run(const nlohmann::json& params, const Client& client);
+  Result<nlohmann::json> checkMapping(const nlohmann::json& params);
   Result<nlohmann::json> jog(const nlohmann::json& params);
   Result<nlohmann::json> plain(RigCommand::Kind kind);
   Result<nlohmann::json> dispatch(const std::string& method, const nlohmann::json& params,

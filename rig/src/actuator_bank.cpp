@@ -101,6 +101,21 @@ std::vector<AxisOutcome> ActuatorBank::setTargets(
   return runTogether(tasks, timeout);
 }
 
+std::vector<AxisOutcome> ActuatorBank::setSpeedLimits(
+    const std::vector<std::optional<double>>& speeds_m_per_s, Timeout timeout) {
+  require(speeds_m_per_s.size() == axes_.size(), "one speed an axis");
+  std::vector<AxisTask> tasks;
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    if (!speeds_m_per_s[i]) continue;
+    tasks.push_back({axes_[i].core_.get(),
+                     [speed = *speeds_m_per_s[i]](ActuatorDriver& driver) {
+                       return driver.setSpeedLimit(speed);
+                     },
+                     OperationKind::kPlain, nullptr});
+  }
+  return runTogether(tasks, timeout);
+}
+
 std::vector<AxisOutcome> ActuatorBank::haltAll(Timeout timeout) {
   return runAll(
       cores(), timeout, [](ActuatorDriver& driver) { return driver.haltAndHold(); },

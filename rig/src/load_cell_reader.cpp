@@ -92,8 +92,8 @@ LoadCellSample LoadCellReader::sample(ModbusLink& link) {
   if (scale_fault != LoadCellFault::kNone) weights.fault = scale_fault;
   sample.fault = plausibility_.judge(weights, sample.stamp_ns);
   const double direction = config_.reversed ? -1.0 : 1.0;
-  sample.gross_N = direction * weights.gross_N;
-  sample.net_N = direction * weights.net_N;
+  sample.gross_N = config_.gain * (direction * weights.gross_N - config_.offset_N);
+  sample.net_N = config_.gain * direction * weights.net_N;
   sample.stable = weights.stable;
   sample.net_mode = weights.net_mode;
   return sample;

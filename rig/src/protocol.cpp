@@ -88,8 +88,10 @@ ProtocolStep readStep(JsonReader in, const Defaults& defaults) {
   return step;
 }
 
-ProtocolPhase readPhase(JsonReader in, const Defaults& defaults) {
-  onlyKnownKeys(in, {"name", "cycles", "step"}, kPage);
+ProtocolPhase readPhase(JsonReader in, Defaults defaults) {
+  onlyKnownKeys(in, {"name", "cycles", "speed_m_per_s", "step"}, kPage);
+  defaults.speed_m_per_s =
+      in.numberOr("speed_m_per_s", defaults.speed_m_per_s, Range::positive(kMaxSpeed_m_per_s));
   ProtocolPhase phase;
   phase.name = in.text("name", kMaxName);
   if (in.has("cycles")) phase.cycles = static_cast<int>(in.integer("cycles", 1, 1000));

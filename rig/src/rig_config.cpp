@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "tenter/calib/cell_calibration.h"
+#include "tenter/calib/cord_calibration.h"
 #include "tenter/core/files.h"
 #include "tenter/core/json_reader.h"
 #include "tenter/core/toml_document.h"
@@ -100,6 +102,43 @@ void readCells(JsonReader& in, RigConfig& rig, const std::optional<fs::path>& fo
   }
 }
 
+/// Gain and zero of every cell. What a session holds was applied already.
+void readCellCalibrationOf(JsonReader& in, RigConfig& rig, const fs::path& folder) {
+  const std::string name = in.text("cells", 512);
+  if (!in.ok()) return;
+  const auto calibration = readCellCalibration(folder / name);
+  if (!calibration) return in.fail("cells", calibration.error().message());
+  if (!calibration->accepted) {
+    return in.fail("cells", name + " was rejected", "calibrate the cells again");
+  }
+  for (LoadCellConfig& cell : rig.cells) {
+    const CellLine* line = calibration->find(cell.id);
+    if (line == nullptr) return in.fail("cells", name + " does not have " + cell.id);
+    cell.gain = line->gain;
+    cell.offset_N = line->offset_N;
+  }
+  rig.calibration_ids["cells"] = calibration->id;
+}
+
+/// Whoever takes friction off a session's tensions has to know which calibration was in force.
+void readCordCalibrationOf(JsonReader& in, RigConfig& rig, const fs::path& folder) {
+  const std::string name = in.text("cords", 512);
+  if (!in.ok()) return;
+  const auto calibration = readCordCalibration(folder / name);
+  if (!calibration) return in.fail("cords", calibration.error().message());
+  if (!calibration->accepted) {
+    return in.fail("cords", name + " was rejected", "calibrate the cords again");
+  }
+  rig.calibration_ids["cords"] = calibration->id;
+}
+
+void readCalibrations(JsonReader in, RigConfig& rig, const std::optional<fs::path>& folder) {
+  onlyKnownKeys(in, {"cells", "cords"}, kPage);
+  if (!folder || !in.ok()) return;
+  if (in.has("cells")) readCellCalibrationOf(in, rig, *folder);
+  if (in.has("cords")) readCordCalibrationOf(in, rig, *folder);
+}
+
 std::optional<int> readCellOf(JsonReader& entry, const RigConfig& rig) {
   if (!entry.has("cell")) return std::nullopt;
   const std::string name = entry.text("cell", kMaxName);
@@ -160,7 +199,7 @@ Result<RigConfig> parse(std::string_view toml, const std::string& file,
   const auto json = jsonOfToml(toml, file);
   if (!json) return json.error();
   JsonReader in(*json, file);
-  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell", "cameras"}, kPage);
+  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell", "cameras", "calibration"}, kPage);
   in.integer("schema_version", 1, 1);
   RigConfig rig;
   rig.text = toml;
@@ -168,6 +207,7 @@ Result<RigConfig> parse(std::string_view toml, const std::string& file,
   rig.limits = readLimits(in.object("limits"));
   if (!in.ok()) return in.error();
   readCells(in, rig, map_folder);
+  if (in.has("calibration")) readCalibrations(in.object("calibration"), rig, map_folder);
   const std::size_t size = in.arraySize("axis");
   if (in.ok() && (size == 0 || size > kMaxAxes)) in.fail("axis", "must be there 1 to 64 times");
   for (std::size_t i = 0; i < size && in.ok(); ++i) {

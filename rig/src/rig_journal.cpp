@@ -74,7 +74,8 @@ RecordBody RigJournal::memoryRecord(const RigMemory& memory, std::int64_t zero_n
                                                      {"heard_ns", heard},
                                                      {"known_m", memory.known_m},
                                                      {"felt_ns", felt},
-                                                     {"tares_N", memory.tares_N}})};
+                                                     {"tares_N", memory.tares_N},
+                                                     {"mapped", memory.mapped}})};
 }
 
 std::vector<RecordBody> RigJournal::tickRecords(const RigTick& tick) {
@@ -91,11 +92,14 @@ std::vector<RecordBody> RigJournal::tickRecords(const RigTick& tick) {
         rig_journal::kHalt, dumped({{"halted_outside", tick.halted_outside}, {"trip", trip}})});
   }
   for (const RigCommand& command : tick.commands) {
-    records.emplace_back(
-        GenericRecord{rig_journal::kCommand, dumped({{"command", rigCommandName(command.kind)},
-                                                     {"axis", command.axis},
-                                                     {"distance_m", command.distance_m},
-                                                     {"speed_m_per_s", command.speed_m_per_s}})});
+    records.emplace_back(GenericRecord{
+        rig_journal::kCommand,
+        dumped(
+            {{"command", rigCommandName(command.kind)},
+             {"axis", command.axis},
+             {"distance_m", command.distance_m},
+             {"speed_m_per_s", command.speed_m_per_s},
+             {"mapping", rig_journal::kMappingNames[static_cast<std::size_t>(command.mapping)]}})});
   }
   SampleRecord sample;
   for (const AxisInput& axis : tick.axes) sample.positions_m.push_back(axis.position_m);

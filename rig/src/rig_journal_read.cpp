@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -63,6 +64,19 @@ std::vector<std::optional<std::int64_t>> readTimes(JsonReader& in, const std::st
   return times;
 }
 
+/// Sessions from before the mapping was checked do not have it.
+std::vector<bool> readMapped(JsonReader& in, std::size_t size) {
+  std::vector<bool> mapped(size, false);
+  if (!in.has("mapped")) return mapped;
+  if (in.arraySize("mapped") != size && in.ok()) in.fail("mapped", "has the wrong length");
+  for (std::size_t i = 0; i < size && in.ok(); ++i) {
+    const nlohmann::json& value = in.json()["mapped"][i];
+    if (!value.is_boolean()) in.fail("mapped", "must be true or false for each axis");
+    mapped[i] = value == true;
+  }
+  return mapped;
+}
+
 std::vector<double> readNumbers(JsonReader& in, const std::string& key, std::size_t size) {
   std::vector<double> numbers = in.numbers(key);
   if (in.ok() && numbers.size() != size) in.fail(key, "has the wrong length");
@@ -112,6 +126,7 @@ Result<void> RigJournalReader::takeMemory(const JournalRecord& record, const std
   }
   memory.known_m = readNumbers(in, "known_m", axes);
   memory.tares_N = readNumbers(in, "tares_N", cells);
+  memory.mapped = readMapped(in, axes);
   if (!in.ok()) return in.error();
   memory_ = std::move(memory);
   return {};
@@ -165,6 +180,12 @@ Result<void> RigJournalReader::takeCommand(const JournalRecord& record, const st
   command.axis = static_cast<int>(in.integer("axis", -1, 1 << 20));
   command.distance_m = in.number("distance_m");
   command.speed_m_per_s = in.number("speed_m_per_s");
+  if (in.has("mapping")) {
+    const auto& names = rig_journal::kMappingNames;
+    const auto name = std::find(names.begin(), names.end(), in.text("mapping", kMaxText));
+    if (in.ok() && name == names.end()) in.fail("mapping", "must be unasked, check or skip");
+    if (in.ok()) command.mapping = static_cast<RigCommand::Mapping>(name - names.begin());
+  }
   if (command.kind == RigCommand::Kind::kRun) command.protocol = protocol_;
   if (!in.ok()) return in.error();
   tick_.commands.push_back(std::move(command));

@@ -21,9 +21,9 @@ bool isLate(std::string_view fault) { return fault == "timeout" || fault == "pre
 constexpr std::size_t kSlopeTicks = 5;  // a slope over one tick would be the cell's noise
 constexpr std::array<std::string_view, 7> kStateNames{"off",    "ready", "caution", "running",
                                                       "paused", "fault", "stopped"};
-constexpr std::array<std::string_view, 12> kCommandNames{"enable", "disable", "home",  "tare",
-                                                         "jog",    "run",     "pause", "resume",
-                                                         "abort",  "stop",    "reset", "unload"};
+constexpr std::array<std::string_view, 13> kCommandNames{
+    "enable", "disable", "home", "tare",  "jog",    "run",          "pause",
+    "resume", "abort",   "stop", "reset", "unload", "check-mapping"};
 
 std::string newtons(double force_N) {
   char text[32];
@@ -63,12 +63,13 @@ RigMachine::RigMachine(RigConfig config)
   begun_m_.resize(config_.axes.size());
   known_m_.resize(config_.axes.size());
   tares_N_.resize(config_.cells.size());
+  mapped_.resize(config_.axes.size());
 }
 
 RigMachine::RigMachine(RigConfig config, const RigMemory& memory) : RigMachine(std::move(config)) {
   require(memory.axes.size() == axes_.size() && memory.heard_ns.size() == axes_.size() &&
               memory.known_m.size() == axes_.size() && memory.felt_ns.size() == felt_ns_.size() &&
-              memory.tares_N.size() == tares_N_.size(),
+              memory.tares_N.size() == tares_N_.size() && memory.mapped.size() == mapped_.size(),
           "RigMachine: a memory of this rig");
   state_ = memory.state;
   reason_ = memory.reason;
@@ -81,11 +82,12 @@ RigMachine::RigMachine(RigConfig config, const RigMemory& memory) : RigMachine(s
   known_m_ = memory.known_m;
   felt_ns_ = memory.felt_ns;
   tares_N_ = memory.tares_N;
+  mapped_ = memory.mapped;
 }
 
 RigMemory RigMachine::memory() const {
-  return {state_, reason_,   enabled_, emergency_, blind_,  last_ns_,
-          axes_,  heard_ns_, known_m_, felt_ns_,   tares_N_};
+  return {state_, reason_,   enabled_, emergency_, blind_,   last_ns_,
+          axes_,  heard_ns_, known_m_, felt_ns_,   tares_N_, mapped_};
 }
 
 RigOrders RigMachine::step(const RigTick& tick) {
@@ -93,6 +95,8 @@ RigOrders RigMachine::step(const RigTick& tick) {
           "RigMachine: one input for each axis and cell");
   RigOrders orders;
   orders.targets_m.resize(config_.axes.size());
+  orders.speeds_m_per_s.resize(config_.axes.size());
+  goals_m_.assign(config_.axes.size(), std::nullopt);
   tick_ = &tick;
   orders_ = &orders;
   remember();
@@ -115,6 +119,8 @@ void RigMachine::remember() {
     const bool late = !input.position_m && isLate(input.fault) && heard_ns_[i] &&
                       tick_->time_ns - *heard_ns_[i] <= kSilence_ns;
     if (!late) axes_[i] = input;
+    // Whoever takes hold of plugs may put them elsewhere.
+    if (!axes_[i].position_m || !axes_[i].energised) mapped_[i] = false;
     if (input.position_m) heard_ns_[i] = tick_->time_ns;
     if (axes_[i].position_m) known_m_[i] = *axes_[i].position_m;
   }
@@ -216,8 +222,8 @@ bool RigMachine::strays(std::size_t axis) const {
 }
 
 void RigMachine::watchAxes() {
-  const bool follows =
-      activity_ == Activity::kJog || activity_ == Activity::kRun || activity_ == Activity::kUnload;
+  const bool follows = activity_ == Activity::kJog || activity_ == Activity::kRun ||
+                       activity_ == Activity::kUnload || activity_ == Activity::kMap;
   for (std::size_t i = 0; i < config_.axes.size(); ++i) {
     const AxisInput& axis = axes_[i];
     const std::string& name = config_.axes[i].device.name;
@@ -342,6 +348,8 @@ std::string RigMachine::refusalOf(const RigCommand& command) const {
       return calm || halted ? refusalOfJog(command) : no;
     case Kind::kRun:
       return state_ == RigState::kReady && idle ? refusalOfRun(command) : no;
+    case Kind::kCheckMapping:
+      return state_ == RigState::kReady && idle ? refusalOfMapping(command) : no;
     case Kind::kHome:
       break;
   }
@@ -404,6 +412,18 @@ std::string RigMachine::refusalOfJog(const RigCommand& command) const {
   return "";
 }
 
+std::string RigMachine::refusalOfMapping(const RigCommand& command) const {
+  bool any = false;
+  for (const RigAxis& axis : config_.axes) any = any || axis.cell.has_value();
+  if (!any) return "no axis has a cell";
+  for (const int axis : command.axes) {
+    if (axis < 0 || axis >= static_cast<int>(config_.axes.size())) return "there is no such axis";
+    const RigAxis& known = config_.axes[static_cast<std::size_t>(axis)];
+    if (!known.cell) return known.device.name + " has no cell";
+  }
+  return "";
+}
+
 std::string RigMachine::refusalOfRun(const RigCommand& command) const {
   if (!command.protocol) return "there is no protocol";
   const Result<void> fits = checkAgainstRig(*command.protocol, config_);
@@ -444,20 +464,17 @@ void RigMachine::carryOut(const RigCommand& command) {
       return;
     case Kind::kRun:
       protocol_ = command.protocol;
-      phase_ = step_ = 0;
-      cycle_ = 0;
-      captures_ = 0;
-      next_capture_ns_ = tick_->time_ns;
+      recording_ = orders_->release_halt = true;
+      if (command.mapping != RigCommand::Mapping::kUnasked) {
+        const std::vector<int> axes = axesToMap(*protocol_);
+        const bool skip = command.mapping == RigCommand::Mapping::kSkip;
+        if (!axes.empty() && !skip) return startMapping(axes);
+        if (!axes.empty()) decide("mapping-check-skipped");
+      }
+      return startProtocol();
+    case Kind::kCheckMapping:
       orders_->release_halt = true;
-      changeState(RigState::kRunning, "protocol " + protocol_->name);
-      begin(Activity::kRun);
-      origins_m_ = known_m_;
-      loading_ = recording_ = true;
-      decide("run",
-             nlohmann::json{
-                 {"protocol", protocol_->name}, {"tares_N", tares_N_}, {"origins_m", origins_m_}}
-                 .dump());
-      return enterStep();
+      return startMapping(command.axes);
     case Kind::kPause:
       paused_since_ns_ = tick_->time_ns;
       return changeState(RigState::kPaused, "paused");

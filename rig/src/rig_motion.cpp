@@ -16,6 +16,11 @@ constexpr double kSlackShare = 0.8;  // of slack_N, so that noise does not make 
 constexpr int kTareTicks = 25;
 constexpr double kMaxTareShare = 0.2;  // of the working force; more is a load, not a tare
 constexpr double kArrived_m = 1e-9;
+constexpr double kFar_m = 1e3;
+/// What an axis may go beyond where it should be, if it is not told anything more.
+constexpr double kLongestLead_m = 1e-4;
+/// An axis so many ticks behind goes faster by so much until it has caught up.
+constexpr double kBehindTicks = 3.0, kCatchUp = 1.25;
 /// Bound on what may follow in one tick without moving: a file of steps that are all done already.
 constexpr int kStepsPerTick = 8;
 
@@ -33,7 +38,8 @@ void RigMachine::begin(Activity activity) {
     const AxisConfig& axis = config_.axes[i].device;
     setpoints_m_[i] = std::clamp(known_m_[i], axis.travel_min_m, axis.travel_max_m);
   }
-  if (!protocol_ && activity == Activity::kJog) origins_m_ = known_m_;
+  const bool on_its_own = activity == Activity::kJog || activity == Activity::kMap;
+  if (!protocol_ && on_its_own) origins_m_ = known_m_;
   history_N_.clear();
   history_ns_.clear();
 }
@@ -64,8 +70,19 @@ void RigMachine::move(const std::vector<double>& velocities_m_per_s) {
     const double v = velocities_m_per_s[i] * (velocities_m_per_s[i] > 0.0 ? scale : 1.0);
     if (v == 0.0) continue;
     const AxisConfig& axis = config_.axes[i].device;
+    const double behind_m = std::abs(setpoints_m_[i] - known_m_[i]);
+    const double most_m =
+        v > 0.0 ? std::min(axis.travel_max_m, goals_m_[i].value_or(kFar_m)) : axis.travel_max_m;
+    const double least_m =
+        v < 0.0 ? std::max(axis.travel_min_m, goals_m_[i].value_or(-kFar_m)) : axis.travel_min_m;
     setpoints_m_[i] = std::clamp(setpoints_m_[i] + v * dt_s_, axis.travel_min_m, axis.travel_max_m);
-    orders_->targets_m[i] = setpoints_m_[i];
+    const double lead_m = std::min(std::abs(v) * dt_s_, kLongestLead_m);
+    orders_->targets_m[i] =
+        std::clamp(setpoints_m_[i] + std::copysign(lead_m, v), std::min(least_m, setpoints_m_[i]),
+                   std::max(most_m, setpoints_m_[i]));
+    const bool late = behind_m > kBehindTicks * std::abs(v) * dt_s_;
+    orders_->speeds_m_per_s[i] =
+        std::min(axis.max_speed_m_per_s, std::abs(v) * (late ? kCatchUp : 1.0));
   }
 }
 
@@ -87,6 +104,8 @@ void RigMachine::act() {
       return actUnload();
     case Activity::kRun:
       return actRun();
+    case Activity::kMap:
+      return actMap();
   }
 }
 
@@ -98,6 +117,7 @@ void RigMachine::actJog() {
     return;
   }
   const double step_m = std::min(jog_speed_m_per_s_ * dt_s_, std::abs(left_m));
+  goals_m_[axis] = jog_target_m_;
   std::vector<double> velocities(config_.axes.size(), 0.0);
   if (dt_s_ > 0.0) velocities[axis] = std::copysign(step_m / dt_s_, left_m);
   move(velocities);
@@ -241,6 +261,22 @@ void RigMachine::leaveStep() {
   startUnloading();
 }
 
+void RigMachine::startProtocol() {
+  phase_ = step_ = 0;
+  cycle_ = 0;
+  captures_ = 0;
+  next_capture_ns_ = tick_->time_ns;
+  changeState(RigState::kRunning, "protocol " + protocol_->name);
+  begin(Activity::kRun);
+  origins_m_ = known_m_;
+  loading_ = true;
+  decide("run",
+         nlohmann::json{
+             {"protocol", protocol_->name}, {"tares_N", tares_N_}, {"origins_m", origins_m_}}
+             .dump());
+  enterStep();
+}
+
 void RigMachine::endRun(const std::string& how) {
   if (!protocol_) return;
   decide("run-ended", nlohmann::json{{"how", how}, {"captures", captures_}}.dump());
@@ -273,6 +309,7 @@ void RigMachine::driveStep(const ProtocolStep& step) {
     const auto i = static_cast<std::size_t>(*config_.findAxis(step.axes[k]));
     if (step.end == StepEnd::kTravel) {
       const double left_m = origins_m_[i] + step.targets_m[k] - setpoints_m_[i];
+      goals_m_[i] = origins_m_[i] + step.targets_m[k];
       const double step_m = std::min(step.speed_m_per_s * dt_s_, std::abs(left_m));
       if (dt_s_ > 0.0) velocities[i] = std::copysign(step_m / dt_s_, left_m);
     } else if (std::abs(setpoints_m_[i] - origins_m_[i]) > step.limit_m) {

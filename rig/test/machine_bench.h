@@ -74,9 +74,15 @@ class MachineBench {
 
   /// Forces as the spring gives them; `extra_N` on the first cell.
   double force_N(std::size_t cell) const {
+    const double added_N = cell == 0 ? extra_N : 0.0;
+    if (own_springs) {
+      const std::size_t axis = crossed ? position_m.size() - 1 - cell : cell;
+      const double drawn_m = position_m[axis] - 0.01 - slack_m;
+      return std::max(0.0, kSample_N_per_m * drawn_m) + added_N;
+    }
     double stretch_m = -0.022;
     for (const double p : position_m) stretch_m += p;
-    return std::max(0.0, kSample_N_per_m * stretch_m) + (cell == 0 ? extra_N : 0.0);
+    return std::max(0.0, kSample_N_per_m * stretch_m) + added_N;
   }
 
   const RigOrders& step() {
@@ -175,6 +181,9 @@ class MachineBench {
   std::vector<RecordBody> records;
   std::vector<double> position_m, goal_m;
   double extra_N = 0.0;
+  bool own_springs = false;  ///< Each cord on a spring of its own,
+  bool crossed = false;      ///< felt by another cord's cell,
+  double slack_m = 0.001;    ///< once it is drawn in so far.
   int stuck = -1, stale_cell = -1, mute_axis = -1;
 
  private:

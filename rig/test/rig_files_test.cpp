@@ -76,7 +76,21 @@ INSTANTIATE_TEST_SUITE_P(
                "not a key"},
         Breach{"limit_m = 0.05", "", "phase[0].step[0].limit_m", "missing"},
         Breach{"force_N = 3.0", "force_N = -3.0", "phase[0].step[0].force_N", "at least"},
+        Breach{"cycles = 2", "cycles = 2\nspeed_m_per_s = 0.0", "phase[0].speed_m_per_s",
+               "must be"},
         Breach{"capture_interval_s = 0.5", "capture_interval_s = 0.0", "capture_interval_s", ""}));
+
+TEST(ProtocolTest, APhaseHasItsOwnSpeedUnlessAStepSaysOtherwise) {
+  const auto protocol = parseCaptureProtocol(
+      replaced(replaced(benchProtocolToml(),
+                        {"cycles = 2", "cycles = 2\nspeed_m_per_s = 0.001", "", ""}),
+               {"force_N = 3.0", "force_N = 3.0\nspeed_m_per_s = 0.002", "", ""}),
+      "a.toml");
+  ASSERT_TRUE(protocol.ok()) << protocol.error().message();
+  const auto& steps = protocol->phases.at(0).steps;
+  EXPECT_EQ(steps.at(0).speed_m_per_s, 0.002);
+  EXPECT_EQ(steps.at(2).speed_m_per_s, 0.001);
+}
 
 class UnfitProtocolTest : public testing::TestWithParam<Breach> {};
 TEST_P(UnfitProtocolTest, IsRefusedByTheRigBeforeAnythingMoves) {
@@ -90,12 +104,13 @@ TEST_P(UnfitProtocolTest, IsRefusedByTheRigBeforeAnythingMoves) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Breaches, UnfitProtocolTest,
-    testing::Values(Breach{"force_N = 3.0", "force_N = 5.5", "step 0", "working force"},
-                    Breach{"axis-2", "axis-7", "step 0", "no axis"},
-                    Breach{"speed_m_per_s = 0.004", "speed_m_per_s = 0.0051", "step 0",
-                           "no faster"},
-                    Breach{"end = \"hold\"\nhold_s = 0.2",
-                           "end = \"travel\"\ntargets_m = {axis-1 = 0.09}", "step 1", "travel"}));
+    testing::Values(
+        Breach{"force_N = 3.0", "force_N = 5.5", "step 0", "working force"},
+        Breach{"axis-2", "axis-7", "step 0", "no axis"},
+        Breach{"speed_m_per_s = 0.004", "speed_m_per_s = 0.0051", "step 0", "no faster"},
+        Breach{"cycles = 2", "cycles = 2\nspeed_m_per_s = 0.006", "step 0", "no faster"},
+        Breach{"end = \"hold\"\nhold_s = 0.2", "end = \"travel\"\ntargets_m = {axis-1 = 0.09}",
+               "step 1", "travel"}));
 
 TEST(ShippedProtocolsTest, AreAllReadableAndNamedAsTheirFiles) {
   std::vector<std::string> names;

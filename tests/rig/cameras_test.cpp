@@ -88,7 +88,7 @@ fs::path runOnce(RunningRig& running) {
 }
 
 TEST(DaemonCamerasTest, ARunRecordsWholeSetsInOrder) {
-  RunningRig running(true, smallCameras());
+  RunningRig running(true, {}, smallCameras());
   const fs::path session = runOnce(running);
   const auto report = verifySession(session);
   ASSERT_TRUE(report);
@@ -117,7 +117,7 @@ TEST(DaemonCamerasTest, ARunRecordsWholeSetsInOrder) {
 }
 
 TEST(DaemonCamerasTest, ClientsSeeWhatTheCamerasSee) {
-  RunningRig running(true, smallCameras());
+  RunningRig running(true, {}, smallCameras());
   ASSERT_TRUE(waitFor(20.0, [&] {
     const auto cameras = running.status()["cameras"];
     return cameras.size() == kCameras && cameras[0]["connected"] && cameras[1]["connected"];
@@ -132,7 +132,7 @@ TEST(DaemonCamerasTest, ClientsSeeWhatTheCamerasSee) {
 }
 
 TEST(DaemonCamerasTest, NoRunBeginsWithoutAllCamerasAndOneThatLeavesIsNamed) {
-  RunningRig running(true, smallCameras());
+  RunningRig running(true, {}, smallCameras());
   running.rig().cameras()->unplug(1);
   const std::string protocol = running.write("still.toml", kStandStill);
   EXPECT_EQ(running.tenterRig({"run", protocol, "-o", running.path("refused")}), 6);

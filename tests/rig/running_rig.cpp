@@ -22,28 +22,37 @@ T valueOf(Result<T> result) {
 
 }  // namespace
 
-RunningRig::RunningRig(bool tcp, std::optional<VirtualCamerasOptions> cameras) {
+RunningRig::RunningRig(bool tcp, const MountOptions& mount,
+                       std::optional<VirtualCamerasOptions> cameras) {
   ServedRigOptions options;
+  options.mount = mount;
   options.state = folder_.path();
   options.tcp = tcp;
   options.cameras = std::move(cameras);
   rig_ = valueOf(ServedRig::start(options));
-  startDaemon();
+  startDaemon("");
 }
 
 std::string RunningRig::log() const { return path("daemon-" + std::to_string(starts_) + ".log"); }
 
-void RunningRig::restartDaemon() {
+void RunningRig::restartDaemon(const std::string& preload) {
   kill(daemon_, SIGKILL);
   wait(daemon_);
   std::filesystem::remove(socket());
-  startDaemon();
+  startDaemon(preload);
 }
 
-void RunningRig::startDaemon() {
+void RunningRig::startDaemon(const std::string& preload) {
   ++starts_;
-  daemon_ = valueOf(rig_->usb().spawn(
-      {TENTER_DAEMON, "--config", rig_->configFile().string(), "--socket", socket()}, log()));
+  std::vector<std::string> command{TENTER_DAEMON, "--config", rig_->configFile().string(),
+                                   "--socket", socket()};
+  const std::string variable = "LD_PRELOAD=";
+  for (const std::string& setting : rig_->usb().environment()) {
+    if (preload.empty() || !setting.starts_with(variable)) continue;
+    const std::string libraries = variable + preload + ":" + setting.substr(variable.size());
+    command.insert(command.begin(), {"/usr/bin/env", libraries});
+  }
+  daemon_ = valueOf(rig_->usb().spawn(command, log()));
   if (!waitFor(10.0, [&] { return std::filesystem::is_socket(socket()); })) {
     throw std::runtime_error("no socket");
   }

@@ -14,15 +14,17 @@ namespace tenter::rig_system_test {
 /// A virtual rig, and the shipped daemon running on it. Throws what goes wrong.
 class RunningRig {
  public:
-  explicit RunningRig(bool tcp = true, std::optional<VirtualCamerasOptions> cameras = {});
+  explicit RunningRig(bool tcp = true, const MountOptions& mount = {},
+                      std::optional<VirtualCamerasOptions> cameras = {});
   ~RunningRig();
   RunningRig(const RunningRig&) = delete;
   RunningRig& operator=(const RunningRig&) = delete;
 
   ServedRig& rig() { return *rig_; }
   pid_t daemon() const { return daemon_; }
-  /// Kills the daemon, if it still runs, and starts another one with a log of its own.
-  void restartDaemon();
+  /// Kills the daemon, if it still runs, and starts another one with a log of its own, and with a
+  /// library before all others if one is named.
+  void restartDaemon(const std::string& preload = "");
   std::string log() const;  ///< The path of the daemon's log.
   std::string path(const std::string& name) const { return folder_ / name; }
   std::string socket() const { return folder_ / "tenterd.sock"; }
@@ -36,7 +38,7 @@ class RunningRig {
   std::string write(const std::string& name, const std::string& text);
 
  private:
-  void startDaemon();
+  void startDaemon(const std::string& preload);
 
   test_support::TemporaryFolder folder_;
   std::unique_ptr<ServedRig> rig_;

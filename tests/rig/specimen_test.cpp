@@ -39,7 +39,7 @@ TEST(SpecimenTest, ASessionsForcesAreTheSpecimensAndThePulleys) {
   const auto mount = readMount(running.path("mount.json"));
   ASSERT_TRUE(mount.ok());
   EXPECT_EQ(mountToJson(*mount), mountToJson(MountOptions{}));
-  const auto truth = truthOfSession({session, *mount, {}, {}});
+  const auto truth = truthOfSession({session, *mount, {}, {}, {}});
   ASSERT_TRUE(truth.ok()) << truth.error().message();
   ASSERT_EQ(truth->cords.size(), 4U);
   EXPECT_LT(truth->rms_N, kAgreement_N);
@@ -52,7 +52,7 @@ TEST(SpecimenTest, ASessionsForcesAreTheSpecimensAndThePulleys) {
 
   MountOptions other;  // a check that could not fail would say nothing
   other.fabric = "satin-4";
-  const auto wrong = truthOfSession({session, other, {}, {}});
+  const auto wrong = truthOfSession({session, other, {}, {}, {}});
   ASSERT_TRUE(wrong.ok());
   EXPECT_GT(wrong->rms_N, kOtherFabric_N);
 }

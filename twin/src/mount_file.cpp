@@ -13,8 +13,9 @@ constexpr std::size_t kMaxFile_bytes = 65'536, kMaxName = 64;
 }  // namespace
 
 nlohmann::json mountToJson(const MountOptions& options) {
-  return {{"schema_version", 1},  {"fabric", options.fabric},     {"protocol", options.protocol},
-          {"seed", options.seed}, {"specimen", options.specimen}, {"nodes", options.nodes}};
+  return {{"schema_version", 1},   {"fabric", options.fabric},     {"protocol", options.protocol},
+          {"seed", options.seed},  {"specimen", options.specimen}, {"nodes", options.nodes},
+          {"clips", options.clips}};
 }
 
 Result<MountOptions> readMount(const std::filesystem::path& file) {
@@ -31,6 +32,7 @@ Result<MountOptions> readMount(const std::filesystem::path& file) {
   options.seed = static_cast<std::uint64_t>(in.integer("seed", 0, kMost));
   options.specimen = static_cast<std::uint64_t>(in.integer("specimen", 0, kMost));
   options.nodes = static_cast<int>(in.integer("nodes", 15, 200));
+  options.clips = in.textOr("clips", options.clips);
   if (!in.ok()) return in.error();
   return options;
 }

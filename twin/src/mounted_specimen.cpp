@@ -13,6 +13,7 @@ constexpr double kLongestStep_m = 0.002;
 constexpr int kMaxHalvings = 6;
 constexpr double kProbe_m = 1e-7;  // of differences: a cord is nearly linear over it
 constexpr double kSame_m = 1e-12;
+constexpr double kHookedCord_m = 1.0;  // of which only changes matter
 
 double longestWay(const MountedSpecimen::Positions& from, const MountedSpecimen::Positions& to) {
   double longest = 0.0;
@@ -48,6 +49,9 @@ struct MountedSpecimen::Impl {
 
   void assignActuators();
   void draw(const Positions& positions_m);
+  bool held() const { return options.clips == "held"; }
+  bool pushes(int axis) const { return options.clips == "free" && lines.empty() && axis == 0; }
+  void feelHeld(const Positions& positions_m);
   bool step(const Positions& positions_m);
   bool settle(const Positions& positions_m, bool foretell);
   void learn(const Positions& positions_m);
@@ -73,6 +77,23 @@ void MountedSpecimen::Impl::draw(const Positions& positions_m) {
         line.home_length_m - sample->rig().clips[line.clip].cords[line.cord].cord.rest_length_m;
     sample->draw(line.clip, line.cord, positions_m[line.axis] - slack_m);
   }
+}
+
+/// Nothing but the cords gives way.
+void MountedSpecimen::Impl::feelHeld(const Positions& positions_m) {
+  moment.at_m = positions_m;
+  moment.stiffness_N_per_m.setZero();
+  for (const Line& line : lines) {
+    for (const double sign : {1.0, -1.0}) {
+      Positions probe = positions_m;
+      probe[line.axis] += sign * kProbe_m;
+      draw(probe);
+      moment.stiffness_N_per_m(line.axis, line.axis) +=
+          sign * tension(sample->state(), line) / (2.0 * kProbe_m);
+    }
+  }
+  draw(positions_m);
+  for (const Line& line : lines) moment.tension_N[line.axis] = tension(sample->state(), line);
 }
 
 /// Begins where the last equilibrium's tangent leads; if that is no good, where it was.
@@ -160,10 +181,13 @@ Result<std::unique_ptr<MountedSpecimen>> MountedSpecimen::hang(const MountOption
   if (options.nodes < 15 || options.nodes > 200) {
     return usageError("the virtual sheet needs 15 to 200 nodes a side");
   }
+  if (options.clips != "free" && options.clips != "held" && options.clips != "unhooked") {
+    return usageError("clips are free, held or unhooked");
+  }
   auto impl = std::make_unique<Impl>();
   impl->options = options;
   impl->line_of.fill(-1);
-  if (!(*protocol)->has_cords)
+  if (!(*protocol)->has_cords || options.clips == "unhooked")
     return std::unique_ptr<MountedSpecimen>(new MountedSpecimen(std::move(impl)));
   CaptureOptions capture;
   capture.protocol = options.protocol;
@@ -183,6 +207,10 @@ Result<std::unique_ptr<MountedSpecimen>> MountedSpecimen::hang(const MountOption
         line.home_length_m -
         hung->impl_->sample->rig().clips[line.clip].cords[line.cord].cord.rest_length_m;
   }
+  if (hung->impl_->held()) {
+    hung->impl_->feelHeld({});
+    return hung;
+  }
   const bool taut = hung->impl_->step(hung->impl_->moment.at_m);
   if (!taut || !hung->follow({})) {
     return notConverged("the virtual cloth found no stable equilibrium when it was hung");
@@ -198,6 +226,10 @@ bool MountedSpecimen::follow(const Positions& positions_m) {
   Impl& impl = *impl_;
   if (!impl.sample) {
     impl.moment.at_m = positions_m;
+    return true;
+  }
+  if (impl.held()) {
+    impl.feelHeld(positions_m);
     return true;
   }
   for (int halvings = 0;;) {
@@ -245,8 +277,7 @@ bool MountedSpecimen::hasCord(int axis) const {
 bool MountedSpecimen::hasCords() const { return !impl_->lines.empty(); }
 
 double MountedSpecimen::hookTension_N(int axis, double position_m) const {
-  const bool pushes = !hasCords() && axis == 0;
-  if (hasCord(axis) || pushes) return 0.0;
+  if (hasCord(axis) || impl_->pushes(axis)) return 0.0;
   return kHook_N_per_m * std::max(0.0, position_m - kHookSlack_m);
 }
 
@@ -254,8 +285,11 @@ std::string MountedSpecimen::cordName(int axis) const {
   return hasCord(axis) ? impl_->lines[static_cast<std::size_t>(axis)].name : "";
 }
 
+bool MountedSpecimen::hasPulley(int axis) const { return !impl_->pushes(axis); }
+
 double MountedSpecimen::cordLength_m(int axis, double position_m, double tension_N) const {
-  if (!hasCord(axis)) return 0.0;
+  if (!hasPulley(axis)) return 0.0;
+  if (!hasCord(axis)) return kHookedCord_m - position_m;
   const Impl::Line& line = impl_->lines[static_cast<std::size_t>(axis)];
   return (line.home_length_m - position_m) * (1.0 + tension_N / line.stiffness_N);
 }

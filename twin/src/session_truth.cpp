@@ -8,6 +8,7 @@
 
 #include "cord_friction.h"
 #include "rig_noise.h"
+#include "tenter/calib/cord_friction.h"
 #include "tenter/session/session_reader.h"
 
 namespace tenter {
@@ -84,7 +85,7 @@ class TruthRun {
     const double truth_N =
         specimen_.moment().tensionNear_N(axis, at) + specimen_.hookTension_N(axis, at[i]);
     double friction_N = 0.0, travel_N = 0.0;
-    if (specimen_.hasCord(axis)) {
+    if (specimen_.hasPulley(axis)) {
       by_length_[i].follow(specimen_.cordLength_m(axis, at[i], truth_N));
       by_travel_[i].follow(kFarPulley_m - at[i]);
       // A cell does not feel less than nothing.
@@ -106,18 +107,42 @@ class TruthRun {
     sums.least_m = std::min(sums.least_m, at[i]);
     sums.most_m = std::max(sums.most_m, at[i]);
     out_.rows.push_back({time_s, axis, at[i], measured_N, friction_N, truth_N});
+    Kept& kept = kept_[i];
+    kept.positions_m.push_back(at[i]);
+    kept.measured_N.push_back(measured_N);
+    kept.truth_N.push_back(truth_N);
+  }
+
+  /// Sum of squares with friction as the calibration has it; nothing without one.
+  std::optional<double> squaresByCords(std::size_t i) const {
+    const CordEntry* cord = options_.cords ? options_.cords->find(header_.actuators[i]) : nullptr;
+    if (cord == nullptr || !cord->friction) return std::nullopt;
+    const Kept& kept = kept_[i];
+    const auto friction_N = frictionAlong(*cord, kept.positions_m, kept.measured_N);
+    double squares = 0.0;
+    for (std::size_t k = 0; k < friction_N.size(); ++k) {
+      const double error_N = kept.measured_N[k] - friction_N[k] - kept.truth_N[k];
+      squares += error_N * error_N;
+    }
+    return squares;
   }
 
   Result<SessionTruth> finished() {
     double squares = 0.0, by_travel = 0.0, samples = 0.0;
+    double by_cords = 0.0, samples_by_cords = 0.0;
     for (int i = 0; i < kAxes; ++i) {
       const Sums& sums = sums_[static_cast<std::size_t>(i)];
       if (sums.samples == 0) continue;
       const auto n = static_cast<double>(sums.samples);
       out_.cords.push_back({header_.actuators[static_cast<std::size_t>(i)], specimen_.cordName(i),
                             sums.samples, std::sqrt(sums.squares / n),
-                            std::sqrt(sums.by_travel / n), sums.sum / n, sums.largest, sums.highest,
-                            sums.most_m - sums.least_m});
+                            std::sqrt(sums.by_travel / n), std::nullopt, sums.sum / n, sums.largest,
+                            sums.highest, sums.most_m - sums.least_m});
+      if (const auto cord = squaresByCords(static_cast<std::size_t>(i))) {
+        out_.cords.back().rms_by_cords_N = std::sqrt(*cord / n);
+        by_cords += *cord;
+        samples_by_cords += n;
+      }
       squares += sums.squares;
       by_travel += sums.by_travel;
       samples += n;
@@ -125,9 +150,15 @@ class TruthRun {
     if (samples == 0.0) return badInput(options_.session.string(), "", "has no samples of cords");
     out_.rms_N = std::sqrt(squares / samples);
     out_.rms_by_travel_N = std::sqrt(by_travel / samples);
+    if (samples_by_cords > 0.0) out_.rms_by_cords_N = std::sqrt(by_cords / samples_by_cords);
     out_.solves = specimen_.statistics().solves;
     return std::move(out_);
   }
+
+  /// What a calibration goes by: one entry a sample.
+  struct Kept {
+    std::vector<double> positions_m, measured_N, truth_N;
+  };
 
   static constexpr double kFarPulley_m = 1.0;  ///< Only changes of a length matter.
 
@@ -136,6 +167,7 @@ class TruthRun {
   SessionHeader header_;
   std::vector<CordFriction> by_length_, by_travel_;
   std::array<Sums, kAxes> sums_{};
+  std::array<Kept, kAxes> kept_;
   SessionTruth out_;
 };
 

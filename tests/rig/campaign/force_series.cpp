@@ -44,7 +44,8 @@ void trial(TrialRig& rig, int number, double wait_s, int cell, bool tcp) {
                     {"specimen", "1"},
                     {"who", "series"},
                     {"operator", "series"},
-                    {"areal_density_kg_per_m2", 0.2}});
+                    {"areal_density_kg_per_m2", 0.2},
+                    {"skip_mapping_check", true}});
   rig.stay(wait_s, true, [](const auto& /*status*/) {});
   const std::int64_t begun_ns = monotonic_ns();
   rig.rig().addForce(cell, kStep_N);

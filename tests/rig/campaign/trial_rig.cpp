@@ -136,7 +136,8 @@ void TrialRig::run(int device, bool hold) {
                 {"specimen", "1"},
                 {"who", "trial"},
                 {"operator", "trial"},
-                {"areal_density_kg_per_m2", 0.2}});
+                {"areal_density_kg_per_m2", 0.2},
+                {"skip_mapping_check", true}});
 }
 
 void TrialRig::enter(RigPhase phase, int device) {

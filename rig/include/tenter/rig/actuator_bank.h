@@ -34,6 +34,9 @@ class ActuatorBank {
   /// An axis without a target is kept alive instead. Precondition: one entry an axis.
   std::vector<AxisOutcome> setTargets(const std::vector<std::optional<double>>& positions_m,
                                       Timeout timeout = Actuator::kDefaultTimeout);
+  /// An axis without a speed is not asked. Precondition: one entry an axis.
+  std::vector<AxisOutcome> setSpeedLimits(const std::vector<std::optional<double>>& speeds_m_per_s,
+                                          Timeout timeout = Actuator::kDefaultTimeout);
   std::vector<AxisOutcome> haltAll(Timeout timeout = Actuator::kDefaultTimeout);
   void allowMotion();
   std::vector<AxisOutcome> deenergiseAll(Timeout timeout = Actuator::kDefaultTimeout);

@@ -76,8 +76,9 @@ struct LoadCellConfig {
   ModbusAddress address;
   int unit = 1;  ///< 1 to 247.
   std::shared_ptr<const RegisterMap> map;
-  bool reversed = false;     ///< The amplifier's positive is compression.
-  double capacity_N = 0.0;   ///< Larger magnitudes are over the range. Must be positive.
+  bool reversed = false;              ///< The amplifier's positive is compression.
+  double capacity_N = 0.0;            ///< Larger magnitudes are over the range. Must be positive.
+  double gain = 1.0, offset_N = 0.0;  ///< force = gain * (what the amplifier says - offset).
   double lowest_N = -1e300;  ///< Tensions below it have the wrong sign; a cord cannot push.
   std::chrono::milliseconds stuck_after{500};     ///< Not one bit moved for so long; 0: off.
   std::chrono::milliseconds response_timeout{0};  ///< 0: the map's.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -40,13 +41,16 @@ struct RigConfig {
   RigLimits limits;
   std::vector<RigAxis> axes;
   std::vector<LoadCellConfig> cells;
+  /// "cells", "cords" to the id of the calibration that the file names.
+  std::map<std::string, std::string> calibration_ids;
   std::string text;  ///< The file, byte for byte.
 
   std::optional<int> findAxis(std::string_view axis_name) const;
 };
 
 /// The error names file, key and reason. Register maps are shipped ones by name, or files beside
-/// this one. No axis is configured faster than the speed cap.
+/// this one. No axis is configured faster than the speed cap. Calibrations that it names are read:
+/// cells get their gain and zero; one that was rejected, or lacks a cell, is an error.
 Result<RigConfig> readRigConfig(const std::filesystem::path& file);
 Result<RigConfig> parseRigConfig(std::string_view toml, const std::filesystem::path& file);
 /// One that a session holds: its register maps are not looked for, cells have none.

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "tenter/rig/mapping_check.h"
 #include "tenter/rig/protocol.h"
 #include "tenter/rig/rig_config.h"
 #include "tenter/session/records.h"
@@ -54,13 +55,19 @@ struct RigCommand {
     kAbort,
     kStop,
     kReset,
-    kUnload
+    kUnload,
+    kCheckMapping
   };
   Kind kind = Kind::kStop;
   std::uint64_t id = 0;  ///< The answer carries it.
   int axis = 0;          ///< kJog
   double distance_m = 0.0, speed_m_per_s = 0.0;
   std::shared_ptr<const CaptureProtocol> protocol;  ///< kRun
+  /// kRun: whether axes whose force ends a step are tried first, unless they were since they got
+  /// current. Sessions from before there was a check say nothing of it.
+  enum class Mapping { kUnasked, kCheck, kSkip };
+  Mapping mapping = Mapping::kUnasked;
+  std::vector<int> axes;  ///< kCheckMapping: of these axes; none: of all that have a cell.
 };
 
 std::string_view rigCommandName(RigCommand::Kind kind);
@@ -95,8 +102,11 @@ struct RigOrders {
   bool halt = false;          ///< All axes at once, without a ramp.
   bool release_halt = false;  ///< Orders that move may be sent again.
   bool energise = false, deenergise = false, home = false;
-  std::vector<std::optional<double>> targets_m;  ///< Nothing: the axis is only kept alive.
-  std::vector<RecordBody> records;               ///< Decisions, states, faults, phases.
+  /// Nothing: the axis is only kept alive. One tick ahead of where the axis should be, so that it
+  /// does not stop before it is told to go on.
+  std::vector<std::optional<double>> targets_m;
+  std::vector<double> speeds_m_per_s;  ///< With which the targets are to be gone for.
+  std::vector<RecordBody> records;     ///< Decisions, states, faults, phases.
   std::vector<RigAnswer> answers;
   bool run_ended = false;  ///< Unloading included: the session may be closed.
 };
@@ -113,6 +123,7 @@ struct RigMemory {
   std::vector<double> known_m;                        ///< Last positions read.
   std::vector<std::int64_t> felt_ns;                  ///< Of each cell, its last tension.
   std::vector<double> tares_N;
+  std::vector<bool> mapped;  ///< Axes whose own cell was seen to answer.
 };
 
 /// The safety state machine with the runner of protocols inside: pure, so that equal ticks give
@@ -136,11 +147,13 @@ class RigMachine {
   bool running() const { return protocol_ != nullptr; }
   const std::vector<double>& tares_N() const { return tares_N_; }
   const RigConfig& config() const { return config_; }
+  /// Of the last check of the mapping, as far as it has come.
+  const std::vector<MappingFinding>& mapping() const { return findings_; }
   /// Complete while nothing moves and no tare is taken.
   RigMemory memory() const;
 
  private:
-  enum class Activity { kNone, kSettle, kJog, kHome, kRun, kUnload, kTare };
+  enum class Activity { kNone, kSettle, kJog, kHome, kRun, kUnload, kTare, kMap };
 
   // rig_machine.cpp: what must not be
   void watch();
@@ -161,6 +174,7 @@ class RigMachine {
   std::optional<std::size_t> axisAtItsEnd(int cell) const;
   std::string refusalOfJog(const RigCommand& command) const;
   std::string refusalOfRun(const RigCommand& command) const;
+  std::string refusalOfMapping(const RigCommand& command) const;
   // rig_motion.cpp: what is to be done
   void act();
   void begin(Activity activity);
@@ -185,6 +199,12 @@ class RigMachine {
   void unloadingEnded(const std::string& left);
   void driveStep(const ProtocolStep& step);
   void decide(const std::string& name, std::string data = "{}");
+  // rig_mapping.cpp: whether each axis pulls its own cell
+  std::vector<int> axesToMap(const CaptureProtocol& protocol) const;
+  void startMapping(const std::vector<int>& axes);
+  void actMap();
+  void mappingDone();
+  void startProtocol();
 
   RigConfig config_;
   double cap_m_per_s_;
@@ -202,9 +222,13 @@ class RigMachine {
   std::int64_t since_ns_ = 0;  ///< When the activity began.
   bool enabled_ = false, emergency_ = false, loading_ = false, recording_ = false;
   std::vector<double> setpoints_m_, origins_m_;  ///< Origins: where the run began.
+  std::vector<std::optional<double>> goals_m_;   ///< Where this tick's motion is to end exactly.
   std::vector<double> begun_m_;                  ///< Where the activity began.
   std::vector<double> known_m_;                  ///< Last positions read.
   std::vector<double> tares_N_, tare_sums_N_;
+  std::optional<MappingCheck> mapping_;
+  std::vector<MappingFinding> findings_;
+  std::vector<bool> mapped_;
   int tare_ticks_ = 0;
   std::deque<std::vector<std::optional<double>>> history_N_;
   std::deque<std::int64_t> history_ns_;

@@ -22,6 +22,9 @@ struct MountOptions {
   std::uint64_t seed = 1;                 ///< Of the disturbance that lets the sheet buckle.
   std::uint64_t specimen = 0;             ///< Which piece of the fabric; 0: as `seed`.
   int nodes = 25;                         ///< Of the simulated sheet, per side; 15 to 200.
+  /// "free": the sample hangs on them. "held": fixed where they are with the sample at rest, so
+  /// that cords alone give way. "unhooked": every cord is hooked to the frame instead.
+  std::string clips = "free";
 };
 
 /// The options as a file that says what hung in a rig, and back. Errors name the field.
@@ -81,7 +84,10 @@ class MountedSpecimen {
   /// other use for it. 0 for the others.
   double hookTension_N(int axis, double position_m) const;
   std::string cordName(int axis) const;  ///< "near/a"; empty without a cord.
-  /// Free cord between clip and pulley, at that moment's tension.
+  /// Whether cord runs over the axis' pulley.
+  bool hasPulley(int axis) const;
+  /// Free cord between clip and pulley, at that moment's tension; of a cord that is hooked to the
+  /// frame, but for a constant.
   double cordLength_m(int axis, double position_m, double tension_N) const;
   const MountOptions& options() const;
 

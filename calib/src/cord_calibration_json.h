@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <string>
+
+#include "tenter/calib/cord_calibration.h"
+
+namespace tenter {
+
+/// The id that this content has.
+std::string idOf(const CordCalibration& calibration);
+
+}  // namespace tenter
