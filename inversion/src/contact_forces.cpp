@@ -3,7 +3,39 @@
 
 #include <utility>
 
+#include "second_order_cone.h"
+
 namespace tenter {
+namespace {
+
+/// Of a vertex's mean weight: a force this far outside its cone is on its border.
+constexpr double kOnBorder = 1e-9;
+
+}  // namespace
+
+Points3 projectedIntoCones(const RestNewton& problem, int vertex_count, const Points3& forces,
+                           const ConeMargin& margin, double load) {
+  const auto& contacts = problem.contacts();
+  const double offset_N = load * margin.offset * problem.weight_N() / vertex_count;
+  Points3 out = forces;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    auto force = out.col(static_cast<Eigen::Index>(i));
+    const Vec3 apex = offset_N * contacts[i].normal;
+    force = apex + projectOnFrictionCone(force - apex, contacts[i].normal,
+                                         margin.friction_share * contacts[i].friction)
+                       .point;
+  }
+  return out;
+}
+
+bool insideCones(const RestNewton& problem, int vertex_count, const Points3& forces,
+                 const ConeMargin& margin, double load) {
+  if (forces.cols() == 0) return true;
+  const Points3 inside = projectedIntoCones(problem, vertex_count, forces, margin, load);
+  return (forces - inside).colwise().norm().maxCoeff() <=
+         kOnBorder * load * problem.weight_N() / vertex_count;
+}
+
 Result<ContactForces> ContactForces::create(const InverseShell& shell, const RestNewton& problem) {
   auto system = shell.system(problem.pose(), problem.fixed());
   if (!system) return system.error();

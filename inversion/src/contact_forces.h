@@ -10,7 +10,15 @@ namespace tenter {
 struct ConeMargin {
   double friction_share = 0.975;  ///< Of mu.
   double offset = 0.02;           ///< Least normal force, in mean weights of a vertex.
+  /// Half as far inside: room for what a change of weight moves.
+  ConeMargin halved() const { return {0.5 * (1.0 + friction_share), 0.5 * offset}; }
 };
+
+/// The nearest forces inside the cones (3 x contacts), and whether they are there already.
+Points3 projectedIntoCones(const RestNewton& problem, int vertex_count, const Points3& forces,
+                           const ConeMargin& margin, double load = 1.0);
+bool insideCones(const RestNewton& problem, int vertex_count, const Points3& forces,
+                 const ConeMargin& margin, double load = 1.0);
 
 /// Contact forces that let a rest shape near the target come out with the least elastic energy: the
 /// convex stage. The energy is that of the shell whose rest shape is the target.

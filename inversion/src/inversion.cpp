@@ -20,6 +20,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::array kMargins{ConeMargin{0.975, 0.02}, ConeMargin{0.9999, 1e-4}};
 /// Of the load's steps, when all of it at once is too much.
 constexpr double kLoadShrink = 0.25, kLoadGrowth = 1.5, kLeastLoadStep = 0.01;
+constexpr int kMaxChoices = 5;
 /// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
 constexpr double kLambdaFloor_per_s2 = 0.05;
 
@@ -74,18 +75,23 @@ class Inverter {
     }
   }
 
-  /// The convex choice of contact forces, and the rest shape for them.
+  /// The convex choice of contact forces, and the rest shape for them; again where its other weight
+  /// has moved them too far.
   bool balance(ContactForces& contact_forces, double load) {
-    auto f = contact_forces.solve(newton_.gradient(unknowns_, load), margin_, load,
-                                  [this] { return stopped(); });
-    out_.factorizations += f.factorizations;
-    say("contact forces chosen: %.0f, %.0f factorizations", f.converged ? 1.0 : 0.0,
-        f.factorizations);
-    if (!f.converged) return false;
-    const RestNewtonResult r = newton_.solve(unknowns_, f.forces, load, newtonOptions());
-    out_.factorizations += r.factorizations;
-    if (r.converged) forces_ = std::move(f.forces);
-    return r.converged;
+    for (int k = 0; k < kMaxChoices && !stopped(); ++k) {
+      auto f = contact_forces.solve(newton_.gradient(unknowns_, load), margin_, load,
+                                    [this] { return stopped(); });
+      out_.factorizations += f.factorizations;
+      say("contact forces chosen: %.0f, %.0f factorizations", f.converged ? 1.0 : 0.0,
+          f.factorizations);
+      if (!f.converged) return false;
+      const RestNewtonResult r = newton_.solve(unknowns_, f.forces, load, newtonOptions());
+      out_.factorizations += r.factorizations;
+      if (!r.converged) return false;
+      forces_ = std::move(f.forces);
+      if (insideCones(newton_, shell_.vertexCount(), forces_, margin_.halved(), load)) return true;
+    }
+    return false;
   }
 
   RestNewtonOptions newtonOptions() const {

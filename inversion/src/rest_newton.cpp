@@ -164,7 +164,8 @@ bool RestNewton::factorize(const RestUnknowns& u, double load) {
       for (int k = 0; k < border_.cols(); ++k)
         entries.emplace_back(row_of_[static_cast<std::size_t>(3 * c.vertex + a)], first + k,
                              -border_(3 * c.vertex + a, k));
-  rounding_ = kRounding * std::numeric_limits<double>::epsilon() * std::sqrt(square_sum) / weight_N_;
+  rounding_ =
+      kRounding * std::numeric_limits<double>::epsilon() * std::sqrt(square_sum) / weight_N_;
   const int n = first + static_cast<int>(border_.cols());
   Eigen::SparseMatrix<double> square(n, n);
   square.setFromTriplets(entries.begin(), entries.end());
@@ -219,7 +220,8 @@ RestNewtonResult RestNewton::solve(RestUnknowns& u, Points3& forces, double load
     if (out.iterations > 0) {
       // How much the last correction was off foretells how far this step may go.
       const double off = std::max(lengthOf(left - step) * length, 1e-300);
-      damping = std::clamp(damping * last_length * lengthOf(left) / off, options.least_damping, 1.0);
+      damping =
+          std::clamp(damping * last_length * lengthOf(left) / off, options.least_damping, 1.0);
     }
     last_length = length;
     for (bool grown = false;;) {
@@ -259,6 +261,12 @@ RestNewtonResult RestNewton::solve(RestUnknowns& u, Points3& forces, double load
   }
 }
 
+std::vector<Points3> RestNewton::globalMotions() const {
+  std::vector<Points3> out;
+  for (Eigen::Index k = 0; k < motions_.cols(); ++k) out.push_back(contactForces(motions_.col(k)));
+  return out;
+}
+
 std::vector<HoldDerivative> RestNewton::derivatives(const RestUnknowns& u, const Points3& forces,
                                                     const Eigen::MatrixXd& by_unknowns) {
   std::vector<HoldDerivative> out;
@@ -266,8 +274,8 @@ std::vector<HoldDerivative> RestNewton::derivatives(const RestUnknowns& u, const
   if (!factorize(u, 1.0)) return out;
   const auto& j = gradientByRest(u, 1.0);
   for (Eigen::Index k = 0; k < by_unknowns.cols(); ++k) {
-    Eigen::VectorXd rhs = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(coordinate_of_.size()) +
-                                                border_.cols());
+    Eigen::VectorXd rhs =
+        Eigen::VectorXd::Zero(static_cast<Eigen::Index>(coordinate_of_.size()) + border_.cols());
     for (std::size_t c = 0; c < coordinate_of_.size(); ++c)
       rhs[static_cast<Eigen::Index>(c)] = by_unknowns(coordinate_of_[c], k);
     Eigen::VectorXd rows;

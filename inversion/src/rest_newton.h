@@ -64,6 +64,10 @@ class RestNewton {
   RestNewtonResult solve(RestUnknowns& unknowns, Points3& forces, double load,
                          const RestNewtonOptions& options);
 
+  /// Unit rigid motions at the contacts that only contact forces stop, 3 x contacts each: forces do
+  /// together on each what the weight does.
+  std::vector<Points3> globalMotions() const;
+
   /// Total derivatives, along the balanced rest shapes, of functions whose derivatives by the
   /// unknowns (rest positions and rotations) are the columns of `by_unknowns`. Empty if the problem
   /// is singular there.

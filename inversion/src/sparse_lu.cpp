@@ -24,9 +24,9 @@ struct SparseLu::Impl {
   bool solve(int system, const Eigen::VectorXd& rhs, Eigen::VectorXd& x) const {
     if (numeric == nullptr) return false;
     x.resize(matrix.cols());
-    const int status = umfpack_di_solve(system, matrix.outerIndexPtr(), matrix.innerIndexPtr(),
-                                        matrix.valuePtr(), x.data(), rhs.data(), numeric,
-                                        control.data(), nullptr);
+    const int status =
+        umfpack_di_solve(system, matrix.outerIndexPtr(), matrix.innerIndexPtr(), matrix.valuePtr(),
+                         x.data(), rhs.data(), numeric, control.data(), nullptr);
     return status == UMFPACK_OK && x.allFinite();
   }
 };

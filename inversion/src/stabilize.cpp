@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "second_order_cone.h"
 #include "soft_modes.h"
 
 namespace tenter {
@@ -83,7 +82,7 @@ class Stabilizer {
             share_ * change.by_fixed.col(static_cast<Eigen::Index>(i));
       const RestNewtonResult r = problem_.solve(trial, trial_forces, 1.0, options_.newton);
       factorizations += r.factorizations;
-      if (r.converged) {
+      if (r.converged && inside(trial_forces)) {
         Modes at_trial = modesAt(trial, options_.modes);
         if (at_trial.modes.values.size() > 0 &&
             deficit(at_trial.modes.values) < deficit(m.modes.values)) {
@@ -102,6 +101,11 @@ class Stabilizer {
   int factorizations = 0;
 
  private:
+  /// Whether forces, moved by the global balance, are where they may be.
+  bool inside(const Points3& forces) const {
+    return insideCones(problem_, shell_.vertexCount(), forces, options_.margin.halved());
+  }
+
   /// How far the eigenvalues are below the floor.
   double deficit(const Eigen::VectorXd& values) const {
     return (options_.lambda_floor_per_s2 - values.array()).cwiseMax(0.0).sum();
@@ -121,53 +125,54 @@ class Stabilizer {
     return problem_.derivatives(u, forces, by_unknowns.leftCols(count));
   }
 
-  /// Least change, in forces of the mean size and kFixedScale, that meets the cuts and leaves
-  /// forces in their cones: its dual, one multiplier a cut, by coordinate ascent.
+  /// A linear form of the change that has to reach `wanted`, or to be it.
+  struct Row {
+    HoldDerivative form;
+    double wanted;
+    bool equal;
+    double multiplier = 0.0;
+  };
+
+  /// Least change, in forces of the mean size and kFixedScale, that meets the cuts, keeps the
+  /// global balance and leaves forces in their cones: its dual, one multiplier a row, by coordinate
+  /// ascent.
   HoldDerivative leastChange(const Points3& forces, const std::vector<HoldDerivative>& cuts,
                              const std::vector<double>& wanted) const {
     const double force_scale =
         forces.cols() > 0 ? forces.norm() / std::sqrt(static_cast<double>(forces.cols())) : 0.0;
     const double force_weight = force_scale * force_scale;
     const double fixed_weight = kFixedScale * size_ * kFixedScale * size_;
-    HoldDerivative pull{Points3::Zero(3, forces.cols()),
-                        Points3::Zero(3, static_cast<Eigen::Index>(problem_.fixed().size()))};
+    const auto fixed_count = static_cast<Eigen::Index>(problem_.fixed().size());
+    HoldDerivative pull{Points3::Zero(3, forces.cols()), Points3::Zero(3, fixed_count)};
     HoldDerivative change = pull;
-    std::vector<double> multiplier(cuts.size(), 0.0);
+    std::vector<Row> rows;
+    for (std::size_t k = 0; k < cuts.size(); ++k) rows.push_back({cuts[k], wanted[k], false});
+    for (const Points3& motion : problem_.globalMotions())
+      rows.push_back({{motion, Points3::Zero(3, fixed_count)}, 0.0, true});
     for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
       double moved = 0.0;
-      for (std::size_t k = 0; k < cuts.size(); ++k) {
-        const HoldDerivative& c = cuts[k];
-        const double curvature =
-            force_weight * c.by_forces.squaredNorm() + fixed_weight * c.by_fixed.squaredNorm();
+      for (Row& row : rows) {
+        const double curvature = force_weight * row.form.by_forces.squaredNorm() +
+                                 fixed_weight * row.form.by_fixed.squaredNorm();
         if (!(curvature > 0.0)) continue;
-        const double reached = c.by_forces.cwiseProduct(change.by_forces).sum() +
-                               c.by_fixed.cwiseProduct(change.by_fixed).sum();
-        const double before = multiplier[k];
-        multiplier[k] = std::max(0.0, before + (wanted[k] - reached) / curvature);
-        const double d = multiplier[k] - before;
-        pull.by_forces += d * force_weight * c.by_forces;
-        pull.by_fixed += d * fixed_weight * c.by_fixed;
+        const double reached = row.form.by_forces.cwiseProduct(change.by_forces).sum() +
+                               row.form.by_fixed.cwiseProduct(change.by_fixed).sum();
+        double d = (row.wanted - reached) / curvature;
+        if (!row.equal) d = std::max(d, -row.multiplier);
+        row.multiplier += d;
+        pull.by_forces += d * force_weight * row.form.by_forces;
+        pull.by_fixed += d * fixed_weight * row.form.by_fixed;
         change.by_fixed = pull.by_fixed;
-        change.by_forces = intoCones(forces + pull.by_forces) - forces;
-        moved = std::max(moved, std::abs(d) * curvature / wanted[k]);
+        change.by_forces = intoCones(forces + pull.by_forces, options_.margin) - forces;
+        moved = std::max(moved, std::abs(d) * std::sqrt(curvature));
       }
       if (moved < kSweepChange) break;
     }
     return change;
   }
 
-  Points3 intoCones(Points3 forces) const {
-    const auto& contacts = problem_.contacts();
-    const double offset_N =
-        options_.margin.offset * problem_.weight_N() / static_cast<double>(shell_.vertexCount());
-    for (std::size_t i = 0; i < contacts.size(); ++i) {
-      auto force = forces.col(static_cast<Eigen::Index>(i));
-      const Vec3 apex = offset_N * contacts[i].normal;
-      force = apex + projectOnFrictionCone(force - apex, contacts[i].normal,
-                                           options_.margin.friction_share * contacts[i].friction)
-                         .point;
-    }
-    return forces;
+  Points3 intoCones(const Points3& forces, const ConeMargin& margin) const {
+    return projectedIntoCones(problem_, shell_.vertexCount(), forces, margin);
   }
 
   const InverseShell& shell_;
