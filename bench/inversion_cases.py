@@ -105,17 +105,20 @@ def beret(columns, rings):
 
 
 def hat(columns, rings):
-    """A crown that lies on the head, and a waving brim."""
+    """A crown that lies on the head, and a brim that hangs out from it in waves."""
     edge = 1.15
 
-    def radius(s, angle):
+    def parts(s):
         polar = min(edge, 2.1 * edge * s)
-        return HEAD * np.sin(polar) + 0.13 * max(0.0, s - 1.0 / 2.1) / (1.0 - 1.0 / 2.1)
+        return polar, max(0.0, s - 1.0 / 2.1) / (1.0 - 1.0 / 2.1)
+
+    def radius(s, angle):
+        polar, brim = parts(s)
+        return HEAD * np.sin(polar) + 0.09 * brim * (1.0 + 0.2 * brim * np.cos(5 * angle))
 
     def height(s, angle):
-        polar = min(edge, 2.1 * edge * s)
-        brim = max(0.0, s - 1.0 / 2.1) / (1.0 - 1.0 / 2.1)
-        return HEAD * np.cos(polar) - 0.02 * brim + 0.02 * brim * brim * np.cos(5 * angle)
+        polar, brim = parts(s)
+        return HEAD * np.cos(polar) - 0.09 * brim * (1.0 - 0.2 * brim * np.cos(5 * angle))
 
     points, faces = disc(columns, rings, radius, height)
     return points, faces, [f"sphere:0,0,0,{HEAD}"]
