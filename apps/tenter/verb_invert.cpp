@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -18,6 +20,10 @@
 namespace tenter::app {
 
 namespace {
+
+constexpr double kLeastBudget_s = 1e-3;
+/// Of the time budget; writing files takes the rest.
+constexpr double kSolving = 0.95;
 
 struct Options {
   std::string target, output, warp, gravity = "0,0,-9.80665";
@@ -180,11 +186,15 @@ Result<int> finish(const Options& o, const InversionProblem& problem, const Inve
 }
 
 Result<int> run(const Options& o, Console& console) {
+  const auto start = std::chrono::steady_clock::now();
   if (auto free = checkOutputFolder(o.output, inversionFolder()); !free) return free.error();
   auto problem = problemOf(o, console);
   if (!problem) return problem.error();
   InversionOptions options;
-  options.time_budget_s = o.time_budget_s;
+  // Reading counts too, and writing is still to come.
+  const std::chrono::duration<double> read = std::chrono::steady_clock::now() - start;
+  if (o.time_budget_s > 0.0)
+    options.time_budget_s = std::max(kSolving * o.time_budget_s - read.count(), kLeastBudget_s);
   options.cancelled = interrupted;
   std::optional<Progress> progress(std::in_place, console);
   options.progress = [&progress](const std::string& stage) {

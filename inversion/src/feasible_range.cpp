@@ -57,9 +57,9 @@ class Search {
     auto result = invert(problem, options);
     if (!result) return result.error();
     const Certificate& c = result->certificate;
-    out_.points.push_back({stiffness, friction, result->status,
-                           c.measured_stability ? c.lambda_min_per_s2
-                                                : std::numeric_limits<double>::quiet_NaN()});
+    out_.points.push_back(
+        {stiffness, friction, result->status,
+         c.measured_stability ? c.lambda_min_per_s2 : std::numeric_limits<double>::quiet_NaN()});
     const bool certified = result->status == InversionStatus::kCertified;
     say(stiffness, friction, name(result->status));
     const bool first = out_.points.size() == 1;
