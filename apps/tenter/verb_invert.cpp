@@ -26,7 +26,7 @@ constexpr double kLeastBudget_s = 1e-3;
 constexpr double kSolving = 0.95;
 
 struct Options {
-  std::string target, output, warp, gravity = "0,0,-9.80665";
+  std::string target, output, warp, method = "direct", gravity = "0,0,-9.80665";
   MaterialOptions material;
   std::vector<std::string> obstacles, fix;
   double friction = 0.4, contact_distance_mm = 0.0, time_budget_s = 0.0;
@@ -61,6 +61,11 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--gravity", o.gravity, "x,y,z [m/s^2]")->capture_default_str();
   command.add_option("--time-budget", o.time_budget_s, "Most seconds; 0: no limit")
       ->check(CLI::NonNegativeNumber);
+  command
+      .add_option("--method", o.method,
+                  "direct, or reference: the algorithm of [Inv18], for comparison on small targets")
+      ->check(CLI::IsMember({"direct", "reference"}))
+      ->capture_default_str();
   command.add_flag("--range", o.range,
                    "Find the multiples of stiffness and friction that have a certified rest shape");
   command.add_option("-o,--output", o.output, "Folder to write")->required();
@@ -132,6 +137,7 @@ nlohmann::json provenanceOf(const Options& o) {
           {"friction", o.friction},
           {"contact_distance_mm", o.contact_distance_mm},
           {"warp", o.warp},
+          {"method", o.method},
           {"time_budget_s", o.time_budget_s}};
 }
 
@@ -196,6 +202,7 @@ Result<int> run(const Options& o, Console& console) {
   if (o.time_budget_s > 0.0)
     options.time_budget_s = std::max(kSolving * o.time_budget_s - read.count(), kLeastBudget_s);
   options.cancelled = interrupted;
+  if (o.method == "reference") options.method = InversionMethod::kReference;
   std::optional<Progress> progress(std::in_place, console);
   options.progress = [&progress](const std::string& stage) {
     spdlog::info("{}", stage);

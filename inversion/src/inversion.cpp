@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "contact_forces.h"
+#include "reference_method.h"
 #include "rest_newton.h"
 #include "stabilize.h"
 
@@ -34,6 +35,7 @@ class Inverter {
     if (problem_.fixed.empty())
       out_.proof = findSlidingProof(problem_.contacts, problem_.material.gravity_m_per_s2);
     if (out_.proof) return finish();
+    if (options_.method == InversionMethod::kReference) return reference();
     auto contact_forces = ContactForces::create(shell_, newton_);
     if (!contact_forces) return contact_forces.error();
     for (const ConeMargin& margin : kMargins) {
@@ -92,6 +94,19 @@ class Inverter {
       if (insideCones(newton_, shell_.vertexCount(), forces_, margin_.halved(), load)) return true;
     }
     return false;
+  }
+
+  Result<InversionResult> reference() {
+    ReferenceOptions o;
+    o.stop = [this] { return stopped(); };
+    o.progress = [this](double lambda, int drapes, double cost) {
+      say("lambda %.4g, %.0f drapes, cost of the cones %.3g", lambda, drapes, cost);
+    };
+    const ReferenceResult r =
+        invertByReference(shell_, newton_, margin_.friction_share, unknowns_, o);
+    out_.drapes = r.drapes;
+    load_ = 1.0;
+    return finish();
   }
 
   RestNewtonOptions newtonOptions() const {
