@@ -308,8 +308,7 @@ SheetMesh InverseShell::sheet(const Points3& rest) const {
   return sheet;
 }
 
-Result<ClothSystem> InverseShell::system(const Points3& rest,
-                                         std::vector<int> held_vertices,
+Result<ClothSystem> InverseShell::system(const Points3& rest, std::vector<int> held_vertices,
                                          std::vector<std::unique_ptr<EnergyTerm>> more) const {
   SheetMesh at_rest = sheet(rest);
   auto terms = makeClothTerms(*material_.model, material_.laws, at_rest, {}, EdgeRotations::kAll);

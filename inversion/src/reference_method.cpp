@@ -181,9 +181,9 @@ class ConeCost final : public ceres::FirstOrderFunction {
     Eigen::VectorXd force;
     p_.shell().gradient(q_, rest, force);
     const Points3& target = p_.problem().pose();
-    force.head(target.size()) += lambda_ * (q_.head(target.size()) -
-                                            Eigen::Map<const Eigen::VectorXd>(target.data(),
-                                                                              target.size()));
+    force.head(target.size()) +=
+        lambda_ *
+        (q_.head(target.size()) - Eigen::Map<const Eigen::VectorXd>(target.data(), target.size()));
     for (const int v : p_.problem().fixed()) force.segment<3>(3 * v).setZero();
     double squares = 0.0;
     Eigen::VectorXd pull = force;  // half the squares derived by the force

@@ -233,6 +233,19 @@ TEST(InversionTest, TheWarpMayBeADirectionInsteadOfMaterialCoordinates) {
   EXPECT_FALSE(framesAlong(problem.target, {Vec3::UnitX()}).ok()) << "what hangs faces x";
 }
 
+TEST(InversionTest, TheReferenceMethodAgreesOnASmallArch) {
+  const InversionProblem problem = standing(4, reference(8.0));
+  InversionOptions options;
+  options.method = InversionMethod::kReference;
+  const auto theirs = invert(problem, options), ours = invert(problem, {});
+  expectCertified(theirs);
+  expectCertified(ours);
+  EXPECT_GT(theirs->drapes, 10);
+  EXPECT_LT((theirs->rest - ours->rest).norm(), 0.01 * ours->certificate.size_m);
+  EXPECT_NEAR(theirs->certificate.lambda_min_per_s2, ours->certificate.lambda_min_per_s2,
+              0.02 * ours->certificate.lambda_min_per_s2);
+}
+
 TEST(InversionTest, NothingThatHoldsItIsAnError) {
   InversionProblem problem = standing(5, reference());
   problem.contacts.clear();

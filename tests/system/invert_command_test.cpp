@@ -20,11 +20,13 @@ using ::testing::HasSubstr;
 std::string component(const std::string& name, const std::string& unit, double stiffness) {
   const bool bending = unit == "N m", even = bending || name == "shear";
   std::ostringstream out;
-  out << R"({"name": ")" << name << R"(", "status": "fitted", "strain_measure": "", "strain_unit": ")"
+  out << R"({"name": ")" << name
+      << R"(", "status": "fitted", "strain_measure": "", "strain_unit": ")"
       << (bending ? "1/m" : "1") << R"(", "stiffness_unit": ")" << unit << R"(", "even": )"
-      << (even ? "true" : "false") << R"(, "tangent_rule": "hermite", "knots": [{"strain": 0, "stiffness": )"
-      << stiffness << R"(, "tangent": 0}, {"strain": )" << (bending ? 100.0 : 0.05)
-      << R"(, "stiffness": )" << 1.4 * stiffness << R"(, "tangent": 0}]})";
+      << (even ? "true" : "false")
+      << R"(, "tangent_rule": "hermite", "knots": [{"strain": 0, "stiffness": )" << stiffness
+      << R"(, "tangent": 0}, {"strain": )" << (bending ? 100.0 : 0.05) << R"(, "stiffness": )"
+      << 1.4 * stiffness << R"(, "tangent": 0}]})";
   return out.str();
 }
 
@@ -73,10 +75,9 @@ TEST(InvertCommand, AFittedFabricOnASphereIsCertified) {
   TemporaryFolder folder;
   folder.write("fitted.json", satin());
   folder.write("TARGET.obj", drapedCap(0.03));
-  const Outcome outcome =
-      tenter({"invert", "TARGET.obj", "--material", "fitted.json", "--obstacle",
-              "sphere:0,0,0,0.1", "--friction", "0.3", "-o", "DIR", "--json"},
-             folder.path());
+  const Outcome outcome = tenter({"invert", "TARGET.obj", "--material", "fitted.json", "--obstacle",
+                                  "sphere:0,0,0,0.1", "--friction", "0.3", "-o", "DIR", "--json"},
+                                 folder.path());
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
   const auto answer = outcome.json();
   EXPECT_EQ(answer.at("status"), "certified");
@@ -101,10 +102,9 @@ TEST(InvertCommand, WithoutMaterialCoordinatesTheWarpIsSaid) {
     bare += '\n';
   }
   folder.write("TARGET.obj", bare);
-  std::vector<std::string> arguments{"invert",     "TARGET.obj",       "--material",
-                                     "fitted.json", "--obstacle",       "sphere:0,0,0,0.1",
-                                     "--friction",  "0.5",              "-o",
-                                     "DIR",         "--json"};
+  std::vector<std::string> arguments{
+      "invert",     "TARGET.obj", "--material", "fitted.json", "--obstacle", "sphere:0,0,0,0.1",
+      "--friction", "0.5",        "-o",         "DIR",         "--json"};
   const Outcome guessed = tenter(arguments, folder.path());
   EXPECT_EQ(guessed.exit_code, 0) << guessed.err << guessed.out;
   EXPECT_THAT(guessed.err, HasSubstr("--warp"));
@@ -117,11 +117,10 @@ TEST(InvertCommand, WithoutMaterialCoordinatesTheWarpIsSaid) {
 TEST(InvertCommand, RangeIsInTheAnswerAndTheFile) {
   TemporaryFolder folder;
   folder.write("TARGET.obj", drapedCap(0.02));
-  const Outcome outcome =
-      tenter({"invert", "TARGET.obj", "--rho", "0.1", "--k-stretch", "30", "--k-bend", "1e-3",
-              "--obstacle", "sphere:0,0,0,0.1", "--friction", "0.4", "--range", "-o", "DIR",
-              "--json"},
-             folder.path());
+  const Outcome outcome = tenter(
+      {"invert", "TARGET.obj", "--rho", "0.1", "--k-stretch", "30", "--k-bend", "1e-3",
+       "--obstacle", "sphere:0,0,0,0.1", "--friction", "0.4", "--range", "-o", "DIR", "--json"},
+      folder.path());
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
   const auto range = outcome.json().at("range");
   EXPECT_LE(range.at("stiffness_factor_min").get<double>(), 1.0);
