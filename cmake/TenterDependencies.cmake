@@ -18,13 +18,13 @@ find_package(OpenCV 4.6 REQUIRED COMPONENTS core imgproc imgcodecs calib3d video
 find_package(embree 3.13 REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOPLY IOXML)
 
-# tenter_cholmod: SuiteSparse 5.12 of Debian comes without a CMake package.
-find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
-find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
-add_library(tenter_cholmod INTERFACE)
-add_library(tenter::cholmod ALIAS tenter_cholmod)
-target_include_directories(tenter_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
-target_link_libraries(tenter_cholmod INTERFACE ${CHOLMOD_LIBRARY})
+# tenter_umfpack: SuiteSparse 5.12 of Debian comes without a CMake package.
+find_path(UMFPACK_INCLUDE_DIR umfpack.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(UMFPACK_LIBRARY umfpack REQUIRED)
+add_library(tenter_umfpack INTERFACE)
+add_library(tenter::umfpack ALIAS tenter_umfpack)
+target_include_directories(tenter_umfpack SYSTEM INTERFACE ${UMFPACK_INCLUDE_DIR})
+target_link_libraries(tenter_umfpack INTERFACE ${UMFPACK_LIBRARY})
 
 # HDF5 without MPI, even where its parallel build is installed too.
 find_package(PkgConfig REQUIRED)

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 
 #include "interrupt.h"
 #include "material_options.h"
@@ -10,6 +13,7 @@
 #include "progress.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
+#include "tenter/inversion/material_directions.h"
 #include "verbs.h"
 #include "vertex_selection.h"
 
@@ -17,11 +21,16 @@ namespace tenter::app {
 
 namespace {
 
+constexpr double kLeastBudget_s = 1e-3;
+/// Of the time budget; writing files takes the rest.
+constexpr double kSolving = 0.95;
+
 struct Options {
-  std::string target, output, gravity = "0,0,-9.80665";
+  std::string target, output, warp, method = "direct", gravity = "0,0,-9.80665";
   MaterialOptions material;
   std::vector<std::string> obstacles, fix;
   double friction = 0.4, contact_distance_mm = 0.0, time_budget_s = 0.0;
+  bool range = false;
 };
 
 void declare(CLI::App& command, Options& o) {
@@ -46,9 +55,19 @@ void declare(CLI::App& command, Options& o) {
       .add_option("--fix", o.fix,
                   "Vertices that are held: 0,99 (from 0), 4-17, box:x0,y0,z0,x1,y1,z1 [m]")
       ->allow_extra_args(false);
+  command.add_option("--warp", o.warp,
+                     "x,y,z: direction of the warp, laid into each triangle, instead of the "
+                     "target's material coordinates");
   command.add_option("--gravity", o.gravity, "x,y,z [m/s^2]")->capture_default_str();
   command.add_option("--time-budget", o.time_budget_s, "Most seconds; 0: no limit")
       ->check(CLI::NonNegativeNumber);
+  command
+      .add_option("--method", o.method,
+                  "direct, or reference: the algorithm of [Inv18], for comparison on small targets")
+      ->check(CLI::IsMember({"direct", "reference"}))
+      ->capture_default_str();
+  command.add_flag("--range", o.range,
+                   "Find the multiples of stiffness and friction that have a certified rest shape");
   command.add_option("-o,--output", o.output, "Folder to write")->required();
 }
 
@@ -61,7 +80,25 @@ Result<ShellMaterial> shellMaterialOf(const Options& o) {
                        Vec3((*gravity)[0], (*gravity)[1], (*gravity)[2])};
 }
 
-Result<InversionProblem> problemOf(const Options& o) {
+/// Material directions where the target has none, or others are asked for.
+Result<std::vector<MaterialFrame>> framesOf(const Options& o, const InversionProblem& problem,
+                                            const Console& console) {
+  const bool needed = problem.material.model->membrane != MembraneElement::kEdges;
+  if (!needed || (o.warp.empty() && problem.target.hasUv())) return std::vector<MaterialFrame>{};
+  if (o.warp.empty()) {
+    console.warn(o.target +
+                 ": no material coordinates without a seam; the warp is laid along y, or along z "
+                 "where the cloth faces y (--warp x,y,z says otherwise)");
+    return framesAlong(problem.target, {Vec3::UnitY(), Vec3::UnitZ()});
+  }
+  const auto warp = parseNumbers(o.warp, 3, "--warp");
+  if (!warp) return warp.error();
+  const Vec3 direction((*warp)[0], (*warp)[1], (*warp)[2]);
+  if (!(direction.norm() > 0.0)) return usageError("--warp has no direction");
+  return framesAlong(problem.target, {direction});
+}
+
+Result<InversionProblem> problemOf(const Options& o, const Console& console) {
   InversionProblem problem;
   auto material = shellMaterialOf(o);
   if (!material) return material.error();
@@ -70,6 +107,9 @@ Result<InversionProblem> problemOf(const Options& o) {
   if (!file) return file.error();
   problem.target = std::move(file->mesh);
   if (auto valid = validateMesh(problem.target); !valid) return valid.error().in(o.target);
+  auto frames = framesOf(o, problem, console);
+  if (!frames) return frames.error().in(o.target);
+  problem.frames = std::move(frames).value();
   auto fixed = selectVertices(o.fix, problem.target);
   if (!fixed) return fixed.error();
   problem.fixed = std::move(fixed).value();
@@ -96,54 +136,90 @@ nlohmann::json provenanceOf(const Options& o) {
           {"obstacles", o.obstacles},
           {"friction", o.friction},
           {"contact_distance_mm", o.contact_distance_mm},
+          {"warp", o.warp},
+          {"method", o.method},
           {"time_budget_s", o.time_budget_s}};
 }
 
 void tell(const Options& o, const InversionProblem& problem, const InversionResult& r,
-          Console& console) {
-  const auto certificate = certificateToJson(problem, r, nullptr);
+          const FeasibleRange* range, Console& console) {
+  const auto certificate = certificateToJson(problem, r, nullptr, range);
   console.answer = {{"contacts", problem.contacts.size()}, {"folder", o.output}};
   for (const char* key :
        {"status", "reason", "force_residual_rel", "cone_violations", "cone_margin_min",
         "lambda_min_per_s2", "negative_eigenvalues", "redrape_max_rel", "seconds", "factorizations",
-        "stretch_max", "bend_max_rad", "load_balanced", "proof"}) {
-    console.answer[key] = certificate.at(key);
+        "stretch_max", "bend_max_rad", "load_balanced", "proof", "range"}) {
+    if (certificate.contains(key)) console.answer[key] = certificate.at(key);
   }
   const Certificate& c = r.certificate;
-  char text[300];
-  std::snprintf(
-      text, sizeof text,
-      "%s: %s; force residual %.2g of the weight, %zu contacts, %d outside their cones, "
-      "smallest eigenvalue %.4g 1/s^2, rest edges up to %.0f %% longer or shorter, %.2g s",
-      o.output.c_str(), name(r.status).c_str(), c.force_residual_rel, problem.contacts.size(),
-      c.cone_violations, c.lambda_min_per_s2, 100.0 * c.stretch.cwiseAbs().maxCoeff(), r.seconds);
+  char text[400], eigenvalue[60] = "stability not looked at";
+  if (c.measured_stability && std::isfinite(c.lambda_min_per_s2))
+    std::snprintf(eigenvalue, sizeof eigenvalue, "smallest eigenvalue %.4g 1/s^2",
+                  c.lambda_min_per_s2);
+  else if (c.measured_stability)
+    std::snprintf(eigenvalue, sizeof eigenvalue, "nothing free to move");
+  std::snprintf(text, sizeof text,
+                "%s: %s; force residual %.2g of the weight, %zu contacts, %d outside their cones, "
+                "%s, rest edges up to %.2g %% longer or shorter, %.2g s",
+                o.output.c_str(), name(r.status).c_str(), c.force_residual_rel,
+                problem.contacts.size(), c.cone_violations, eigenvalue,
+                100.0 * c.stretch.cwiseAbs().maxCoeff(), r.seconds);
   console.say(text);
 }
 
+/// A factor for people.
+std::string shown(const std::optional<double>& factor) {
+  if (!factor) return "none";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", *factor);
+  return text;
+}
+
+Result<int> finish(const Options& o, const InversionProblem& problem, const InversionResult& result,
+                   const FeasibleRange* range, Console& console) {
+  auto provenance = provenanceOf(o);
+  if (auto done = writeInversion(o.output, problem, result, provenance, range); !done)
+    return done.error();
+  tell(o, problem, result, range, console);
+  if (range != nullptr) {
+    console.say("certified from " + shown(range->stiffness_min) + " to " +
+                shown(range->stiffness_max) + " times the stiffness, and from " +
+                shown(range->friction_min) + " times the friction on");
+  }
+  if (result.status == InversionStatus::kCertified) return kDone;
+  console.warn(name(result.status) + ": " + result.reason + "; the best so far is in " + o.output);
+  return static_cast<int>(ErrorKind::kNotConverged);
+}
+
 Result<int> run(const Options& o, Console& console) {
+  const auto start = std::chrono::steady_clock::now();
   if (auto free = checkOutputFolder(o.output, inversionFolder()); !free) return free.error();
-  const auto problem = problemOf(o);
+  auto problem = problemOf(o, console);
   if (!problem) return problem.error();
   InversionOptions options;
-  options.time_budget_s = o.time_budget_s;
+  // Reading counts too, and writing is still to come.
+  const std::chrono::duration<double> read = std::chrono::steady_clock::now() - start;
+  if (o.time_budget_s > 0.0)
+    options.time_budget_s = std::max(kSolving * o.time_budget_s - read.count(), kLeastBudget_s);
   options.cancelled = interrupted;
-  Result<InversionResult> result = badInput("", "", "");
-  {
-    Progress progress(console);
-    options.progress = [&progress](const std::string& stage) {
-      spdlog::info("{}", stage);
-      progress.show(-1.0, stage);
-    };
-    result = invert(*problem, options);
+  if (o.method == "reference") options.method = InversionMethod::kReference;
+  std::optional<Progress> progress(std::in_place, console);
+  options.progress = [&progress](const std::string& stage) {
+    spdlog::info("{}", stage);
+    progress->show(-1.0, stage);
+  };
+  const auto placed = [&](const Error& e) { return e.file.empty() ? e.in(o.target) : e; };
+  if (!o.range) {
+    const auto result = invert(*problem, options);
+    progress.reset();
+    if (!result) return placed(result.error());
+    return finish(o, *problem, *result, nullptr, console);
   }
-  if (!result) return result.error().file.empty() ? result.error().in(o.target) : result.error();
-  if (auto done = writeInversion(o.output, *problem, *result, provenanceOf(o)); !done)
-    return done.error();
-  tell(o, *problem, *result, console);
-  if (result->status == InversionStatus::kCertified) return kDone;
-  console.warn(name(result->status) + ": " + result->reason + "; the best so far is in " +
-               o.output);
-  return static_cast<int>(ErrorKind::kNotConverged);
+  const auto range = findFeasibleRange(*problem, options);
+  progress.reset();
+  if (!range) return placed(range.error());
+  problem->material = scaled(problem->material, range->result_stiffness);
+  return finish(o, *problem, range->result, &*range, console);
 }
 
 }  // namespace

@@ -133,10 +133,12 @@ bool redrape(const InverseShell& shell, const Points3& rest, const std::vector<i
   EquilibriumOptions solving;
   solving.max_iterations = kRedrapeIterations;
   solving.force_tolerance_N = kRedrapeForce * out.weight_N / shell.vertexCount();
-  solving.cancelled = [&] { return stopped.load(); };
-  tbb::parallel_for(0, options.redrapes, [&](int k) {
+  solving.cancelled = [&] {
     if (options.stop && options.stop()) stopped = true;
-    if (stopped) return;
+    return stopped.load();
+  };
+  tbb::parallel_for(0, options.redrapes, [&](int k) {
+    if (solving.cancelled()) return;
     auto& bench = benches.local();
     if (!bench) bench = std::make_unique<Bench>(shell.system(rest, held).value());
     ClothState moved = perturbed(state, is_held, options.perturbation_rel * out.size_m,

@@ -308,11 +308,12 @@ SheetMesh InverseShell::sheet(const Points3& rest) const {
   return sheet;
 }
 
-Result<ClothSystem> InverseShell::system(const Points3& rest,
-                                         std::vector<int> held_vertices) const {
+Result<ClothSystem> InverseShell::system(const Points3& rest, std::vector<int> held_vertices,
+                                         std::vector<std::unique_ptr<EnergyTerm>> more) const {
   SheetMesh at_rest = sheet(rest);
   auto terms = makeClothTerms(*material_.model, material_.laws, at_rest, {}, EdgeRotations::kAll);
   if (!terms) return terms.error();
+  for (auto& term : more) terms->terms.push_back(std::move(term));
   SystemSetup setup;
   setup.areal_density_kg_per_m2 = material_.areal_density_kg_per_m2;
   setup.gravity_m_per_s2 = material_.gravity_m_per_s2;

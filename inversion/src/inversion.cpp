@@ -5,11 +5,11 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
-#include <limits>
 #include <utility>
 
 #include "contact_forces.h"
-#include "force_balance.h"
+#include "reference_method.h"
+#include "rest_newton.h"
 #include "stabilize.h"
 
 namespace tenter {
@@ -17,17 +17,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Shares of friction and least normal forces (in mean weights of a vertex) that cones are solved
-/// for: with room to spare first, then on their borders.
-struct Margin {
-  double friction_share, offset;
-};
-constexpr std::array kMargins{Margin{0.975, 0.02}, Margin{0.9999, 1e-4}};
-constexpr int kMaxOuter = 4;
+/// With room to spare first, then on the cones' borders.
+constexpr std::array kMargins{ConeMargin{0.975, 0.02}, ConeMargin{0.9999, 1e-4}};
 /// Of the load's steps, when all of it at once is too much.
 constexpr double kLoadShrink = 0.25, kLoadGrowth = 1.5, kLeastLoadStep = 0.01;
-/// Another choice of forces has to be worth this share of the residual.
-constexpr double kWorthAnother = 0.7;
+constexpr int kMaxChoices = 5;
 /// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
 constexpr double kLambdaFloor_per_s2 = 0.05;
 
@@ -37,45 +31,42 @@ class Inverter {
       : problem_(problem), options_(options), shell_(std::move(shell)) {}
 
   Result<InversionResult> run() {
-    unknowns_.rest = problem_.target.positions;
-    unknowns_.rotations = Eigen::VectorXd::Zero(shell_.rotationCount());
-    BalanceSetup setup;
-    setup.fixed = problem_.fixed;
-    setup.contacts = problem_.contacts;
-    ForceBalance balance(shell_, problem_.target.positions, setup);
+    forgetRest();
     if (problem_.fixed.empty())
       out_.proof = findSlidingProof(problem_.contacts, problem_.material.gravity_m_per_s2);
-    if (out_.proof) return finish(balance);
-    auto contact_forces = ContactForces::create(shell_, problem_.target.positions, setup);
+    if (out_.proof) return finish();
+    if (options_.method == InversionMethod::kReference) return reference();
+    auto contact_forces = ContactForces::create(shell_, newton_);
     if (!contact_forces) return contact_forces.error();
-    for (const Margin& margin : kMargins) {
-      unknowns_.rest = problem_.target.positions;
-      unknowns_.rotations.setZero();
-      balance.setup().friction_share = margin.friction_share;
-      balance.setup().offset = margin.offset;
-      raiseLoad(balance, *contact_forces);
-      if (balanced_.converged || stopped() || problem_.contacts.empty() || load_ > 0.0) break;
+    for (const ConeMargin& margin : kMargins) {
+      forgetRest();
+      margin_ = margin;
+      raiseLoad(*contact_forces);
+      if (stopped() || problem_.contacts.empty() || load_ > 0.0) break;
     }
     const bool all_held = problem_.fixed.size() + problem_.contacts.size() ==
                           static_cast<std::size_t>(shell_.vertexCount());
-    if (balanced_.converged && !all_held) makeStable(balance);
-    return finish(balance);
+    if (load_ >= 1.0 && !all_held) makeStable();
+    return finish();
   }
 
  private:
+  void forgetRest() {
+    unknowns_.rest = problem_.target.positions;
+    unknowns_.rotations = Eigen::VectorXd::Zero(shell_.rotationCount());
+  }
+
   /// Balances all of the weight at once if that can be done, otherwise in steps: without load the
   /// target is its own rest shape, and each solution starts the next. `load_` is what was reached.
-  void raiseLoad(ForceBalance& balance, ContactForces& contact_forces) {
+  void raiseLoad(ContactForces& contact_forces) {
     double step = 1.0;
     load_ = 0.0;
     while (!stopped()) {
       const RestUnknowns before = unknowns_;
-      balance.setup().load = std::min(1.0, load_ + step);
-      say("load %.4g", balance.setup().load);
-      balanced_ = {};
-      balanceForces(balance, contact_forces);
-      if (balanced_.converged) {
-        load_ = balance.setup().load;
+      const double load = std::min(1.0, load_ + step);
+      say("load %.4g", load);
+      if (balance(contact_forces, load)) {
+        load_ = load;
         if (load_ >= 1.0) break;
         step *= kLoadGrowth;
         continue;
@@ -84,62 +75,58 @@ class Inverter {
       step *= kLoadShrink;
       if (step < kLeastLoadStep) break;
     }
-    balance.setup().load = 1.0;
-    balanced_.converged = load_ >= 1.0;
   }
 
-  /// Alternates the convex choice of contact forces with rest shapes for these forces, then
-  /// polishes with cones that are a little wider, so that no force changes sides any more.
-  void balanceForces(ForceBalance& balance, ContactForces& contact_forces) {
-    BalanceOptions frozen;
-    frozen.stop = [this] { return stopped(); };
-    frozen.progress = [this](int k, double r) { say("forces given: %.0f, residual %.3g", k, r); };
-    frozen.worthwhile = 0.9;
-    frozen.patience = 3;
-    BalanceOptions polish = frozen;
-    polish.progress = [this](int k, double r) {
-      say("forces in cones: %.0f, residual %.3g", k, r);
-    };
-    polish.patience = 4;
-    double last = std::numeric_limits<double>::infinity();
-    for (int outer = 0; outer < kMaxOuter && !stopped(); ++outer) {
-      const auto f =
-          contact_forces.solve(balance.gradient(unknowns_), balance.setup(), frozen.stop);
+  /// The convex choice of contact forces, and the rest shape for them; again where its other weight
+  /// has moved them too far.
+  bool balance(ContactForces& contact_forces, double load) {
+    for (int k = 0; k < kMaxChoices && !stopped(); ++k) {
+      auto f = contact_forces.solve(newton_.gradient(unknowns_, load), margin_, load,
+                                    [this] { return stopped(); });
       out_.factorizations += f.factorizations;
       say("contact forces chosen: %.0f, %.0f factorizations", f.converged ? 1.0 : 0.0,
           f.factorizations);
-      if (!f.converged) return;
-      const BalanceResult r = balance.solve(unknowns_, &f.forces, frozen);
+      if (!f.converged) return false;
+      const RestNewtonResult r = newton_.solve(unknowns_, f.forces, load, newtonOptions());
       out_.factorizations += r.factorizations;
-      const RestUnknowns before = unknowns_;
-      const BalanceSetup strict = widenCones(balance);
-      balanced_ = balance.solve(unknowns_, nullptr, polish);
-      out_.factorizations += balanced_.factorizations;
-      balance.setup() = strict;
-      if (balanced_.converged || r.residual > kWorthAnother * last) return;
-      last = r.residual;
-      unknowns_ = before;
+      if (!r.converged) return false;
+      forces_ = std::move(f.forces);
+      if (insideCones(newton_, shell_.vertexCount(), forces_, margin_.halved(), load)) return true;
     }
+    return false;
   }
 
-  static BalanceSetup widenCones(ForceBalance& balance) {
-    const BalanceSetup strict = balance.setup();
-    balance.setup().friction_share = 0.5 * (1.0 + strict.friction_share);
-    balance.setup().offset = 0.5 * strict.offset;
-    return strict;
+  Result<InversionResult> reference() {
+    ReferenceOptions o;
+    o.stop = [this] { return stopped(); };
+    o.progress = [this](double lambda, int drapes, double cost) {
+      say("lambda %.4g, %.0f drapes, cost of the cones %.3g", lambda, drapes, cost);
+    };
+    const ReferenceResult r =
+        invertByReference(shell_, newton_, margin_.friction_share, unknowns_, o);
+    out_.drapes = r.drapes;
+    load_ = 1.0;
+    return finish();
   }
 
-  void makeStable(ForceBalance& balance) {
-    const BalanceSetup strict = widenCones(balance);
+  RestNewtonOptions newtonOptions() const {
+    RestNewtonOptions o;
+    o.stop = [this] { return stopped(); };
+    o.progress = [this](int k, double r, double t) {
+      say("rest shape: %.0f, residual %.3g, step %.3g", k, r, t);
+    };
+    return o;
+  }
+
+  void makeStable() {
     StabilizeOptions o;
     o.lambda_floor_per_s2 = kLambdaFloor_per_s2;
-    o.stop = [this] { return stopped(); };
+    o.margin = margin_;
+    o.newton = newtonOptions();
+    o.stop = o.newton.stop;
     o.progress = [this](int k, double l) { say("stability %.0f lambda_min %.4g", double(k), l); };
-    o.balance.stop = o.stop;
-    o.balance.max_iterations = 30;
-    const StabilizeResult r = stabilize(shell_, balance, unknowns_, o);
+    const StabilizeResult r = stabilize(shell_, newton_, unknowns_, forces_, o);
     out_.factorizations += r.factorizations;
-    balance.setup() = strict;
   }
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
@@ -147,18 +134,18 @@ class Inverter {
     return (options_.cancelled && options_.cancelled()) ||
            (options_.time_budget_s > 0.0 && seconds() > options_.time_budget_s);
   }
-  void say(const char* format, double a = 0.0, double b = 0.0) const {
+  void say(const char* format, double a = 0.0, double b = 0.0, double c = 0.0) const {
     if (!options_.progress) return;
     char text[120];
-    std::snprintf(text, sizeof text, format, a, b);
+    std::snprintf(text, sizeof text, format, a, b, c);
     options_.progress(text);
   }
 
-  Result<InversionResult> finish(ForceBalance& balance) {
+  Result<InversionResult> finish() {
     out_.load_balanced = load_;
     out_.rest = unknowns_.rest;
     out_.rotations = unknowns_.rotations;
-    out_.contact_forces = balance.contactForces(balance.gradient(unknowns_));
+    out_.contact_forces = newton_.contactForces(newton_.gradient(unknowns_, 1.0));
     say("solved after %.3g s", seconds());
     CertificateOptions c;
     c.redrapes = options_.redrapes;
@@ -189,8 +176,10 @@ class Inverter {
   const InversionOptions& options_;
   InverseShell shell_;
   Clock::time_point start_ = Clock::now();
+  RestNewton newton_{shell_, problem_.target.positions, problem_.fixed, problem_.contacts};
+  ConeMargin margin_;
   RestUnknowns unknowns_;
-  BalanceResult balanced_;
+  Points3 forces_;     ///< Of the contacts that unknowns_ balances.
   double load_ = 0.0;  ///< Share of gravity that is balanced.
   InversionResult out_;
 };

@@ -6,6 +6,7 @@
 
 #include "tenter/core/files.h"
 #include "tenter/core/mesh_io.h"
+#include "tenter/inversion/material_directions.h"
 #include "vtp_cells.h"
 
 namespace tenter {
@@ -102,6 +103,7 @@ Result<void> writeMeshes(const std::filesystem::path& folder, const InversionPro
     margins(0, i) = c.cone_margins[static_cast<std::size_t>(i)];
     holds(0, i) = c.contact_holds[static_cast<std::size_t>(i)] ? 1.0 : 0.0;
   }
+  if (!problem.frames.empty()) data.cell["warp"] = warpOf(problem.target, problem.frames);
   data.point["contact_force_N"] = force;
   data.point["support"] = role;
   if (auto done = writeVtp(folder / "pose.vtp", problem.target, data); !done) return done;
@@ -123,11 +125,11 @@ Result<void> writeMeshes(const std::filesystem::path& folder, const InversionPro
 }  // namespace
 
 nlohmann::json certificateToJson(const InversionProblem& problem, const InversionResult& result,
-                                 const nlohmann::json& provenance) {
+                                 const nlohmann::json& provenance, const FeasibleRange* range) {
   const Certificate& c = result.certificate;
   nlohmann::json fixed = nlohmann::json::array();
   for (const int v : problem.fixed) fixed.push_back(v);
-  return {
+  nlohmann::json out = {
       {"schema_version", kInversionSchemaVersion},
       {"status", name(result.status)},
       {"reason", result.reason},
@@ -157,6 +159,31 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
       {"seconds", result.seconds},
       {"factorizations", result.factorizations},
       {"provenance", provenance}};
+  if (range != nullptr) out["range"] = rangeToJson(*range);
+  return out;
+}
+
+nlohmann::json rangeToJson(const FeasibleRange& range) {
+  const auto optional = [](const std::optional<double>& value) {
+    return value ? nlohmann::json(*value) : nlohmann::json();
+  };
+  nlohmann::json points = nlohmann::json::array();
+  for (const RangePoint& p : range.points) {
+    points.push_back({{"stiffness_factor", p.stiffness_factor},
+                      {"friction_factor", p.friction_factor},
+                      {"status", name(p.status)},
+                      {"lambda_min_per_s2", numberOrNull(true, p.lambda_min_per_s2)}});
+  }
+  return {{"stiffness_factor_min", optional(range.stiffness_min)},
+          {"stiffness_factor_max", optional(range.stiffness_max)},
+          {"stiffness_factor_below", optional(range.stiffness_below)},
+          {"friction_factor_min", optional(range.friction_min)},
+          {"friction_factor_below", optional(range.friction_below)},
+          {"friction_at_stiffness_factor", range.friction_at_stiffness},
+          {"friction_factor_proved_below", numberOrNull(true, range.friction_proved_below)},
+          {"result_stiffness_factor", range.result_stiffness},
+          {"complete", range.complete},
+          {"points", points}};
 }
 
 const FolderKind& inversionFolder() {
@@ -167,11 +194,13 @@ const FolderKind& inversionFolder() {
 }
 
 Result<void> writeInversion(const std::filesystem::path& folder, const InversionProblem& problem,
-                            const InversionResult& result, const nlohmann::json& provenance) {
+                            const InversionResult& result, const nlohmann::json& provenance,
+                            const FeasibleRange* range) {
   return writeFolderAtomically(folder, inversionFolder(), [&](const std::filesystem::path& place) {
     if (auto done = writeMeshes(place, problem, result); !done) return done;
-    return writeFileAtomically(place / inversionFolder().marker,
-                               certificateToJson(problem, result, provenance).dump(2) + "\n");
+    return writeFileAtomically(
+        place / inversionFolder().marker,
+        certificateToJson(problem, result, provenance, range).dump(2) + "\n");
   });
 }
 

@@ -12,13 +12,14 @@
 namespace tenter {
 namespace {
 
-/// Of the target's size: the difference step along a mode, and the longest step of a round.
-constexpr double kDifference = 1e-5, kLongestStep = 0.02;
+/// Of the target's size: the difference step along a mode, and what a fixed vertex' rest position
+/// moves when a contact force moves by the mean of them all.
+constexpr double kDifference = 1e-5, kFixedScale = 0.01;
 constexpr double kOvershoot = 1.5;  ///< Cuts ask for this times the floor.
-constexpr int kMaxHalvings = 4;
+constexpr int kMaxTries = 5;
 constexpr double kShrink = 0.3;
-/// Room in a cone, of its radius, from which on a force is not watched.
-constexpr double kNearBorder = 0.5;
+constexpr int kMaxSweeps = 300;
+constexpr double kSweepChange = 1e-6;
 /// So many rounds have to mend this share of what is missing.
 constexpr int kTrial = 3;
 constexpr double kWorthGoingOn = 0.05;
@@ -30,10 +31,10 @@ struct Modes {
 
 class Stabilizer {
  public:
-  Stabilizer(const InverseShell& shell, ForceBalance& balance, const StabilizeOptions& options)
-      : shell_(shell), balance_(balance), options_(options), size_(sizeOf(balance.pose())) {
-    held_ = balance.setup().fixed;
-    for (const Contact& c : balance.setup().contacts) held_.push_back(c.vertex);
+  Stabilizer(const InverseShell& shell, RestNewton& problem, const StabilizeOptions& options)
+      : shell_(shell), problem_(problem), options_(options), size_(sizeOf(problem.pose())) {
+    held_ = problem.fixed();
+    for (const Contact& c : problem.contacts()) held_.push_back(c.vertex);
     std::vector<char> is_held(static_cast<std::size_t>(shell.vertexCount()), 0);
     for (const int v : held_) is_held[v] = 1;
     for (int v = 0; v < shell.vertexCount(); ++v)
@@ -46,7 +47,7 @@ class Stabilizer {
     auto system = shell_.system(u.rest, held_);
     if (!system) return out;
     ClothState state = system->restState();
-    state.q = shell_.coordinates(balance_.pose(), u.rotations);
+    state.q = shell_.coordinates(problem_.pose(), u.rotations);
     const SparseLower& h = system->hessian(state, Projection::kNone);
     if (!cholesky_) cholesky_.emplace(h);
     out.modes = softModes(h, system->dofMass(), *cholesky_, count);
@@ -60,47 +61,39 @@ class Stabilizer {
   /// d(v' H v) / d(unknowns), by central differences of exact second derivatives along v.
   Eigen::VectorXd curvatureByUnknowns(const RestUnknowns& u, const Eigen::VectorXd& mode) const {
     const double step = kDifference * size_ / mode.cwiseAbs().maxCoeff();
-    const Eigen::VectorXd q = shell_.coordinates(balance_.pose(), u.rotations);
+    const Eigen::VectorXd q = shell_.coordinates(problem_.pose(), u.rotations);
     Eigen::VectorXd out = shell_.gradientByRest(q + step * mode, u.rest).transpose() * mode;
     out -= shell_.gradientByRest(q - step * mode, u.rest).transpose() * mode;
     return out / (2.0 * step);
   }
 
   /// One round. False if no step raises the smallest eigenvalue.
-  bool step(RestUnknowns& u, Modes& m) {
-    std::vector<Eigen::VectorXd> cuts;
+  bool step(RestUnknowns& u, Points3& forces, Modes& m) {
     std::vector<double> wanted;
-    addModeCuts(u, m, cuts, wanted);
-    addConeCuts(u, cuts, wanted);
-    Eigen::MatrixXd c(shell_.coordinateCount(), static_cast<Eigen::Index>(cuts.size()));
-    Eigen::VectorXd w(c.cols());
-    for (std::size_t k = 0; k < cuts.size(); ++k) {
-      const double norm = std::max(cuts[k].norm(), 1e-300);
-      c.col(static_cast<Eigen::Index>(k)) = cuts[k] / norm;
-      w[static_cast<Eigen::Index>(k)] = wanted[k] / norm;
-    }
-    const Eigen::VectorXd d = balance_.keepingForces(u, c, w);
-    ++factorizations;
-    const double longest = d.head(u.rest.size()).cwiseAbs().maxCoeff();
-    if (!(longest > 0.0) || !std::isfinite(longest)) return false;
-    for (int k = 0; k < kMaxHalvings; ++k) {
+    const std::vector<HoldDerivative> cuts = modeCuts(u, forces, m, wanted);
+    if (cuts.empty()) return false;
+    const HoldDerivative change = leastChange(forces, cuts, wanted);
+    for (int k = 0; k < kMaxTries; ++k) {
       if (options_.stop && options_.stop()) return false;
-      const double t = std::min(1.0, reach_ / longest);
       RestUnknowns trial = u;
-      ForceBalance::move(trial, d, t);
-      const BalanceResult r = balance_.solve(trial, nullptr, options_.balance);
+      Points3 trial_forces = forces + share_ * change.by_forces;
+      for (std::size_t i = 0; i < problem_.fixed().size(); ++i)
+        trial.rest.col(problem_.fixed()[i]) +=
+            share_ * change.by_fixed.col(static_cast<Eigen::Index>(i));
+      const RestNewtonResult r = problem_.solve(trial, trial_forces, 1.0, options_.newton);
       factorizations += r.factorizations;
-      if (r.converged) {
+      if (r.converged && inside(trial_forces)) {
         Modes at_trial = modesAt(trial, options_.modes);
         if (at_trial.modes.values.size() > 0 &&
             deficit(at_trial.modes.values) < deficit(m.modes.values)) {
           u = std::move(trial);
+          forces = std::move(trial_forces);
           m = std::move(at_trial);
-          if (k == 0) reach_ = std::min(2.0 * reach_, kLongestStep * size_);
+          if (k == 0) share_ = std::min(1.0, 2.0 * share_);
           return true;
         }
       }
-      reach_ = kShrink * std::min(reach_, longest);
+      share_ *= kShrink;
     }
     return false;
   }
@@ -108,61 +101,95 @@ class Stabilizer {
   int factorizations = 0;
 
  private:
+  /// Whether forces, moved by the global balance, are where they may be.
+  bool inside(const Points3& forces) const {
+    return insideCones(problem_, shell_.vertexCount(), forces, options_.margin.halved());
+  }
+
   /// How far the eigenvalues are below the floor.
   double deficit(const Eigen::VectorXd& values) const {
     return (options_.lambda_floor_per_s2 - values.array()).cwiseMax(0.0).sum();
   }
 
-  void addModeCuts(const RestUnknowns& u, const Modes& m, std::vector<Eigen::VectorXd>& cuts,
-                   std::vector<double>& wanted) const {
+  /// Derivatives of the eigenvalues that are too small, and by how much each has to rise.
+  std::vector<HoldDerivative> modeCuts(const RestUnknowns& u, const Points3& forces, const Modes& m,
+                                       std::vector<double>& wanted) {
     const double asked = kOvershoot * options_.lambda_floor_per_s2;
-    for (Eigen::Index k = 0; k < m.modes.values.size() && m.modes.values[k] < asked; ++k) {
-      cuts.push_back(curvatureByUnknowns(u, m.full.col(k)));
-      wanted.push_back(asked - m.modes.values[k]);
+    Eigen::MatrixXd by_unknowns(shell_.coordinateCount(), m.modes.values.size());
+    Eigen::Index count = 0;
+    for (; count < m.modes.values.size() && m.modes.values[count] < asked; ++count) {
+      by_unknowns.col(count) = curvatureByUnknowns(u, m.full.col(count));
+      wanted.push_back(asked - m.modes.values[count]);
     }
+    ++factorizations;
+    return problem_.derivatives(u, forces, by_unknowns.leftCols(count));
   }
 
-  /// Contact forces stay inside their cones to first order.
-  void addConeCuts(const RestUnknowns& u, std::vector<Eigen::VectorXd>& cuts,
-                   std::vector<double>& wanted) const {
-    const BalanceSetup& setup = balance_.setup();
-    if (setup.contacts.empty()) return;
-    const Points3 forces = balance_.contactForces(balance_.gradient(u));
-    const auto& by_rest =
-        shell_.gradientByRest(shell_.coordinates(balance_.pose(), u.rotations), u.rest);
-    Eigen::VectorXd row = Eigen::VectorXd::Zero(shell_.coordinateCount());
-    for (std::size_t i = 0; i < setup.contacts.size(); ++i) {
-      const Contact& c = setup.contacts[i];
-      const double mu = setup.friction_share * c.friction;
-      const Vec3 force = forces.col(static_cast<Eigen::Index>(i));
-      const double normal = force.dot(c.normal);
-      const Vec3 tangent = force - normal * c.normal;
-      const double room = mu * normal - tangent.norm();
-      if (room > kNearBorder * mu * normal) continue;
-      Vec3 inwards = mu * c.normal;
-      if (tangent.norm() > 0.0) inwards -= tangent.normalized();
-      row.segment<3>(3 * c.vertex) = inwards;
-      cuts.push_back(by_rest.transpose() * row);
-      wanted.push_back(-std::max(0.0, room));
-      row.segment<3>(3 * c.vertex).setZero();
+  /// A linear form of the change that has to reach `wanted`, or to be it.
+  struct Row {
+    HoldDerivative form;
+    double wanted;
+    bool equal;
+    double multiplier = 0.0;
+  };
+
+  /// Least change, in forces of the mean size and kFixedScale, that meets the cuts, keeps the
+  /// global balance and leaves forces in their cones: its dual, one multiplier a row, by coordinate
+  /// ascent.
+  HoldDerivative leastChange(const Points3& forces, const std::vector<HoldDerivative>& cuts,
+                             const std::vector<double>& wanted) const {
+    const double force_scale =
+        forces.cols() > 0 ? forces.norm() / std::sqrt(static_cast<double>(forces.cols())) : 0.0;
+    const double force_weight = force_scale * force_scale;
+    const double fixed_weight = kFixedScale * size_ * kFixedScale * size_;
+    const auto fixed_count = static_cast<Eigen::Index>(problem_.fixed().size());
+    HoldDerivative pull{Points3::Zero(3, forces.cols()), Points3::Zero(3, fixed_count)};
+    HoldDerivative change = pull;
+    std::vector<Row> rows;
+    for (std::size_t k = 0; k < cuts.size(); ++k) rows.push_back({cuts[k], wanted[k], false});
+    for (const Points3& motion : problem_.globalMotions())
+      rows.push_back({{motion, Points3::Zero(3, fixed_count)}, 0.0, true});
+    for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
+      double moved = 0.0;
+      for (Row& row : rows) {
+        const double curvature = force_weight * row.form.by_forces.squaredNorm() +
+                                 fixed_weight * row.form.by_fixed.squaredNorm();
+        if (!(curvature > 0.0)) continue;
+        const double reached = row.form.by_forces.cwiseProduct(change.by_forces).sum() +
+                               row.form.by_fixed.cwiseProduct(change.by_fixed).sum();
+        double d = (row.wanted - reached) / curvature;
+        if (!row.equal) d = std::max(d, -row.multiplier);
+        row.multiplier += d;
+        pull.by_forces += d * force_weight * row.form.by_forces;
+        pull.by_fixed += d * fixed_weight * row.form.by_fixed;
+        change.by_fixed = pull.by_fixed;
+        change.by_forces = intoCones(forces + pull.by_forces, options_.margin) - forces;
+        moved = std::max(moved, std::abs(d) * std::sqrt(curvature));
+      }
+      if (moved < kSweepChange) break;
     }
+    return change;
+  }
+
+  Points3 intoCones(const Points3& forces, const ConeMargin& margin) const {
+    return projectedIntoCones(problem_, shell_.vertexCount(), forces, margin);
   }
 
   const InverseShell& shell_;
-  ForceBalance& balance_;
+  RestNewton& problem_;
   const StabilizeOptions& options_;
   double size_;
-  double reach_ = kLongestStep * size_;  ///< Longest step that is trusted.
+  double share_ = 1.0;  ///< Of the least change, that is trusted.
   std::vector<int> held_, free_;
   std::optional<SparseCholesky> cholesky_;
 };
 
 }  // namespace
 
-StabilizeResult stabilize(const InverseShell& shell, ForceBalance& balance, RestUnknowns& unknowns,
-                          const StabilizeOptions& options) {
+StabilizeResult stabilize(const InverseShell& shell, RestNewton& problem, RestUnknowns& unknowns,
+                          Points3& forces, const StabilizeOptions& options) {
   StabilizeResult out;
-  Stabilizer stabilizer(shell, balance, options);
+  Stabilizer stabilizer(shell, problem, options);
   Modes modes = stabilizer.modesAt(unknowns, options.modes);
   double earlier = -std::numeric_limits<double>::infinity();
   for (; modes.modes.values.size() > 0; ++out.rounds) {
@@ -174,7 +201,7 @@ StabilizeResult stabilize(const InverseShell& shell, ForceBalance& balance, Rest
       if (earlier + kWorthGoingOn * std::abs(earlier) > out.lambda_min_per_s2) break;
       earlier = out.lambda_min_per_s2;
     }
-    if (!stabilizer.step(unknowns, modes)) break;
+    if (!stabilizer.step(unknowns, forces, modes)) break;
   }
   out.factorizations = stabilizer.factorizations;
   return out;

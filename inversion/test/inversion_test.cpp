@@ -10,6 +10,7 @@
 #include "tenter/core/files.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
+#include "tenter/inversion/material_directions.h"
 #include "tenter/mechanics/equilibrium.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
@@ -81,6 +82,60 @@ TEST(InversionTest, WithoutInversionTheArchSags) {
   EXPECT_FALSE(c->holds());
 }
 
+/// Satin: stretch 1e4 N/m, bending 5e-6 N m, with stiffening curves.
+ShellMaterial satin(const std::string& law) {
+  const ClothModel* model = findClothModel(law).value();
+  std::vector<ComponentCurve> curves;
+  for (int i = 0; i < model->componentCount(); ++i) {
+    const ComponentInfo& info = model->component(i);
+    const bool bending = info.stiffness_unit == "N m", shear = info.name == "shear";
+    const double k = bending ? 5e-6 : shear ? 40.0 : 1e4;
+    const double end = bending ? 100.0 : 0.02;
+    ComponentCurve c;
+    if (info.constant_only)
+      c.curve = StiffnessCurve::constant(info.may_be_negative ? 0.1 * k : k);
+    else if (info.even)
+      c.curve = StiffnessCurve::fromKnots({0.0, end}, {k, 0.8 * k}, {0.0, 0.0}, true).value();
+    else
+      c.curve = StiffnessCurve::fromKnots({0.0, end}, {k, 1.5 * k}, {0.0, k / end}).value();
+    curves.push_back(std::move(c));
+  }
+  return {model, makeLaws(*model, curves), 0.12, kDefaultGravity};
+}
+
+/// A sheet over the upper half of a cylinder of 0.1 m that hangs 5 cm beyond it on both sides.
+InversionProblem overCylinder(ShellMaterial material) {
+  constexpr int kCount = 9;
+  constexpr double kRadius_m = 0.1, kHang_m = 0.05;
+  const double quarter = 0.5 * std::numbers::pi * kRadius_m, reach = quarter + kHang_m;
+  InversionProblem problem;
+  problem.target = test::bentTarget(kCount, kCount);
+  for (int j = 0; j < kCount; ++j) {
+    for (int i = 0; i < kCount; ++i) {
+      const double s = reach * (2.0 * i / (kCount - 1) - 1.0), y = 0.15 * j / (kCount - 1);
+      const double over = std::min(std::abs(s), quarter), down = std::abs(s) - over;
+      problem.target.positions.col(j * kCount + i) =
+          Vec3(std::copysign(kRadius_m * std::sin(over / kRadius_m), s), y,
+               kRadius_m * std::cos(over / kRadius_m) - down);
+      problem.target.uv.col(j * kCount + i) = Vec2(s, y);
+    }
+  }
+  problem.material = std::move(material);
+  std::vector<std::unique_ptr<Obstacle>> obstacles;
+  obstacles.push_back(makeObstacle("cylinder:0,0,0,0,1,0,0.1").value());
+  problem.contacts = findContacts(problem.target, obstacles, {}, {0.3, 0.0}).value();
+  return problem;
+}
+
+TEST(InversionTest, ClothFarStifferInStretchThanInBendingHangsOverACylinder) {
+  for (const char* law : {"soft", "stvk", "stvk-coupled"}) {
+    SCOPED_TRACE(law);
+    const InversionProblem problem = overCylinder(satin(law));
+    ASSERT_LT(problem.contacts.size(), 81u);
+    expectCertified(invert(problem, {}));
+  }
+}
+
 TEST(InversionTest, FixedVerticesMayPull) {
   InversionProblem problem = standing(10, reference(2.0));
   for (const Contact& c : problem.contacts) problem.fixed.push_back(c.vertex);
@@ -131,6 +186,66 @@ TEST(InversionTest, WhatIsTooSoftIsNeverCalledGood) {
   }
 }
 
+TEST(InversionTest, RangeEndsWhereAnArchBuckles) {
+  const auto range = findFeasibleRange(standing(7, reference()), {});
+  ASSERT_TRUE(range.ok()) << range.error().message();
+  EXPECT_TRUE(range->complete);
+  ASSERT_TRUE(range->stiffness_min && range->stiffness_below && range->friction_min);
+  EXPECT_LE(*range->stiffness_min, kRangeRatio * *range->stiffness_below);
+  EXPECT_EQ(*range->stiffness_max, kStiffestFactor);
+  EXPECT_LE(*range->friction_min, 1.0);
+  EXPECT_EQ(range->result.status, InversionStatus::kCertified);
+  for (const RangePoint& p : range->points) {
+    if (p.friction_factor != 1.0) continue;
+    const bool inside = p.stiffness_factor >= *range->stiffness_min;
+    EXPECT_EQ(p.status == InversionStatus::kCertified, inside) << p.stiffness_factor;
+  }
+  // What it says of the softest holds when it is asked again.
+  InversionProblem again = standing(7, reference());
+  again.material = scaled(again.material, *range->stiffness_min);
+  expectCertified(invert(again, {}));
+}
+
+TEST(InversionTest, RangeOfWhatSlidesStartsAtTheProvedFriction) {
+  const auto range = findFeasibleRange(onSlope(0.4 * 1.5, 0.4), {});
+  ASSERT_TRUE(range.ok());
+  EXPECT_NEAR(range->friction_proved_below, 1.5, 1e-3);
+  ASSERT_TRUE(range->friction_min);
+  EXPECT_GE(*range->friction_min, range->friction_proved_below);
+  EXPECT_LE(*range->friction_min, kRangeRatio * range->friction_proved_below);
+  EXPECT_EQ(range->result.status, InversionStatus::kInfeasible);
+}
+
+TEST(InversionTest, TheWarpMayBeADirectionInsteadOfMaterialCoordinates) {
+  InversionProblem problem = overCylinder(satin("stvk"));
+  const auto along = [&](const Vec3& warp) {
+    InversionProblem other = problem;
+    other.target.uv.resize(2, 0);
+    other.frames = framesAlong(problem.target, {warp}).value();
+    return invert(other, {});
+  };
+  const auto by_uv = invert(problem, {}), by_direction = along(Vec3::UnitY());
+  expectCertified(by_direction);
+  // uv of this target is the direction's arc length, so both are one problem.
+  EXPECT_LT((by_uv->rest - by_direction->rest).norm(), 1e-6);
+  const Points3 warp = warpOf(problem.target, framesAlong(problem.target, {Vec3::UnitY()}).value());
+  for (Eigen::Index t = 0; t < warp.cols(); ++t) EXPECT_GT(warp(1, t), 0.999999);
+  EXPECT_FALSE(framesAlong(problem.target, {Vec3::UnitX()}).ok()) << "what hangs faces x";
+}
+
+TEST(InversionTest, TheReferenceMethodAgreesOnASmallArch) {
+  const InversionProblem problem = standing(4, reference(8.0));
+  InversionOptions options;
+  options.method = InversionMethod::kReference;
+  const auto theirs = invert(problem, options), ours = invert(problem, {});
+  expectCertified(theirs);
+  expectCertified(ours);
+  EXPECT_GT(theirs->drapes, 10);
+  EXPECT_LT((theirs->rest - ours->rest).norm(), 0.01 * ours->certificate.size_m);
+  EXPECT_NEAR(theirs->certificate.lambda_min_per_s2, ours->certificate.lambda_min_per_s2,
+              0.02 * ours->certificate.lambda_min_per_s2);
+}
+
 TEST(InversionTest, NothingThatHoldsItIsAnError) {
   InversionProblem problem = standing(5, reference());
   problem.contacts.clear();
@@ -146,6 +261,14 @@ TEST(InversionTest, FilesAgreeWithTheSchemaAndReadBack) {
   EXPECT_EQ(test_support::listFolder(folder / "out"),
             (std::vector<std::string>{"certificate.json", "contacts.vtp", "pose.vtp", "rest.obj",
                                       "strains.vtp"}));
+  const auto range = findFeasibleRange(problem, {});
+  ASSERT_TRUE(
+      writeInversion(folder / "range", problem, range->result, {{"program", "test"}}, &*range)
+          .ok());
+  EXPECT_EQ(test_support::schemaErrors(
+                nlohmann::json::parse(test_support::slurp(folder / "range/certificate.json")),
+                test_support::sourceFolder() / "docs/formats/certificate.schema.json"),
+            std::vector<std::string>{});
   const auto json = nlohmann::json::parse(test_support::slurp(folder / "out/certificate.json"));
   EXPECT_EQ(test_support::schemaErrors(
                 json, test_support::sourceFolder() / "docs/formats/certificate.schema.json"),

@@ -57,8 +57,10 @@ class InverseShell {
   double weight_N(const Points3& rest) const;       ///< Total mass times |gravity|.
 
   SheetMesh sheet(const Points3& rest) const;
-  /// The forward problem on that rest shape. Error as ClothSystem::create.
-  Result<ClothSystem> system(const Points3& rest, std::vector<int> held_vertices) const;
+  /// The forward problem on that rest shape, with more energies if given. Error as
+  /// ClothSystem::create.
+  Result<ClothSystem> system(const Points3& rest, std::vector<int> held_vertices,
+                             std::vector<std::unique_ptr<EnergyTerm>> more = {}) const;
 
  private:
   InverseShell() = default;

@@ -29,7 +29,13 @@ enum class InversionStatus {
 std::string name(
     InversionStatus status);  ///< "certified", "infeasible", "not_converged", "budget".
 
+enum class InversionMethod {
+  kDirect,     ///< Convex choice of contact forces, Newton's method, stability (docs/inversion.md).
+  kReference,  ///< The algorithm of [Inv18], for comparison: thousands of drapes, small cases only.
+};
+
 struct InversionOptions {
+  InversionMethod method = InversionMethod::kDirect;
   double time_budget_s = 0.0;  ///< 0: none.
   std::function<bool()> cancelled;
   std::function<void(const std::string& stage)> progress;
@@ -49,6 +55,7 @@ struct InversionResult {
   double load_balanced = 0.0;
   double seconds = 0.0;
   int factorizations = 0;
+  int drapes = 0;  ///< Of the reference method.
 };
 
 /// Finds a rest shape whose stable equilibrium under gravity and the contacts' friction is the

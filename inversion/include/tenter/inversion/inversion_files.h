@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tenter/core/files.h"
-#include "tenter/inversion/inversion.h"
+#include "tenter/inversion/feasible_range.h"
 
 namespace tenter {
 
@@ -14,13 +14,16 @@ inline constexpr int kInversionSchemaVersion = 1;
 const FolderKind& inversionFolder();
 
 /// certificate.json (docs/formats/inversion.md). `provenance`: whatever the caller adds: file
-/// names, options, version.
+/// names, options, version. `range`: of a search that the result belongs to.
 nlohmann::json certificateToJson(const InversionProblem& problem, const InversionResult& result,
-                                 const nlohmann::json& provenance);
+                                 const nlohmann::json& provenance,
+                                 const FeasibleRange* range = nullptr);
+nlohmann::json rangeToJson(const FeasibleRange& range);
 
 /// A folder with rest.obj, pose.vtp, contacts.vtp, strains.vtp and certificate.json: complete or
 /// absent; replaces an older result there.
 Result<void> writeInversion(const std::filesystem::path& folder, const InversionProblem& problem,
-                            const InversionResult& result, const nlohmann::json& provenance);
+                            const InversionResult& result, const nlohmann::json& provenance,
+                            const FeasibleRange* range = nullptr);
 
 }  // namespace tenter
