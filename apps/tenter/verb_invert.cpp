@@ -10,6 +10,7 @@
 #include "progress.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
+#include "tenter/inversion/problem_file.h"
 #include "verbs.h"
 #include "vertex_selection.h"
 
@@ -86,6 +87,13 @@ Result<InversionProblem> problemOf(const Options& o) {
   return problem;
 }
 
+Result<nlohmann::json> askedOf(const Options& o, const InversionProblem& problem) {
+  auto material = materialOf(o.material);
+  if (!material) return material.error();
+  return problemToJson({std::move(material).value(), problem.material.gravity_m_per_s2, o.friction,
+                        problem.fixed, o.obstacles});
+}
+
 nlohmann::json provenanceOf(const Options& o) {
   return {{"program", std::string("tenter ") + TENTER_VERSION},
           {"target", o.target},
@@ -124,6 +132,8 @@ Result<int> run(const Options& o, Console& console) {
   if (auto free = checkOutputFolder(o.output, inversionFolder()); !free) return free.error();
   const auto problem = problemOf(o);
   if (!problem) return problem.error();
+  const auto asked = askedOf(o, *problem);
+  if (!asked) return asked.error();
   InversionOptions options;
   options.time_budget_s = o.time_budget_s;
   options.cancelled = interrupted;
@@ -137,7 +147,7 @@ Result<int> run(const Options& o, Console& console) {
     result = invert(*problem, options);
   }
   if (!result) return result.error().file.empty() ? result.error().in(o.target) : result.error();
-  if (auto done = writeInversion(o.output, *problem, *result, provenanceOf(o)); !done)
+  if (auto done = writeInversion(o.output, *problem, *result, provenanceOf(o), *asked); !done)
     return done.error();
   tell(o, *problem, *result, console);
   if (result->status == InversionStatus::kCertified) return kDone;

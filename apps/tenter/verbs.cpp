@@ -7,9 +7,10 @@ namespace tenter::app {
 
 std::span<const Verb> verbs() {
   static const std::array kVerbs = {
-      importVerb(),    fitVerb(),     evaluateVerb(),  materialVerb(), exportVerb(),
-      drapeVerb(),     invertVerb(),  twinVerb(),      protocolVerb(), sessionVerb(),
-      calibrateVerb(), patternVerb(), correlateVerb(), demoVerb(),     versionVerb(),
+      importVerb(),  fitVerb(),       evaluateVerb(), materialVerb(),
+      exportVerb(),  drapeVerb(),     invertVerb(),   resimulateVerb(),
+      twinVerb(),    protocolVerb(),  sessionVerb(),  calibrateVerb(),
+      patternVerb(), correlateVerb(), demoVerb(),     versionVerb(),
 #ifdef TENTER_HARDWARE
       rigVerb(),
 #endif

@@ -17,8 +17,7 @@ void AirDrag::setShape(const Points3& positions) {
   }
 }
 
-void AirDrag::add(const Points3& velocities, Points3& forces,
-                  std::vector<Mat3>* resistance) const {
+void AirDrag::add(const Points3& velocities, Points3& forces, std::vector<Mat3>* resistance) const {
   for (std::size_t t = 0; t < triangles_.size(); ++t) {
     const auto column = static_cast<Eigen::Index>(t);
     const Vec3 normal = normals_.col(column);
@@ -33,8 +32,8 @@ void AirDrag::add(const Points3& velocities, Points3& forces,
       if (resistance == nullptr) continue;
       Mat3 block = air_.normal_drag * 2.0 * speed_through * along;
       if (speed_past > 0.0)
-        block += air_.tangential_drag * (speed_past * (Mat3::Identity() - along) +
-                                         past * past.transpose() / speed_past);
+        block += air_.tangential_drag *
+                 (speed_past * (Mat3::Identity() - along) + past * past.transpose() / speed_past);
       (*resistance)[static_cast<std::size_t>(v)] += half * block;
     }
   }

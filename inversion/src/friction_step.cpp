@@ -98,8 +98,7 @@ Eigen::VectorXd FrictionStep::dofsOf(const ClothState& state) const {
 Points3 FrictionStep::spread(const Eigen::VectorXd& dofs) const {
   Points3 out = Points3::Zero(3, static_cast<Eigen::Index>(first_dof_.size()));
   for (std::size_t v = 0; v < first_dof_.size(); ++v) {
-    if (first_dof_[v] >= 0)
-      out.col(static_cast<Eigen::Index>(v)) = dofs.segment<3>(first_dof_[v]);
+    if (first_dof_[v] >= 0) out.col(static_cast<Eigen::Index>(v)) = dofs.segment<3>(first_dof_[v]);
   }
   return out;
 }
@@ -133,8 +132,8 @@ void FrictionStep::evaluate(const StepEquation& e, const Eigen::VectorXd& v, Clo
   for (std::size_t i = 0; i < e.contacts.size(); ++i) {
     const StepContact& c = e.contacts[i];
     const int dof = first_dof_[c.vertex];
-    const Vec3 y = Vec3(out.forces.segment<3>(dof)) -
-                   stiffening(e, c) * deSaxce(c, relative(c, v, dof));
+    const Vec3 y =
+        Vec3(out.forces.segment<3>(dof)) - stiffening(e, c) * deSaxce(c, relative(c, v, dof));
     const ConeProjection p = projectOnFrictionCone(y, c.normal, c.friction);
     out.residual.segment<3>(dof) -= p.point;
     out.projections[i] = p.derivative;
@@ -230,8 +229,7 @@ void FrictionStep::correctForSlip(const std::vector<SlipColumn>& slips, Eigen::V
   step -= moved;
 }
 
-std::vector<VertexContact> FrictionStep::contactsAt(const StepEquation& e,
-                                                    const Eigen::VectorXd& v,
+std::vector<VertexContact> FrictionStep::contactsAt(const StepEquation& e, const Eigen::VectorXd& v,
                                                     const Point& at) const {
   std::vector<VertexContact> out;
   for (const StepContact& c : e.contacts) {
@@ -241,9 +239,9 @@ std::vector<VertexContact> FrictionStep::contactsAt(const StepEquation& e,
     VertexContact contact;
     contact.mode = modeOf(c, y);
     contact.obstacle = c.obstacle;
+    contact.gap_m = e.h_s * u.dot(c.normal);
     contact.force_N = projectOnFrictionCone(y, c.normal, c.friction).point;
-    if (contact.mode != ContactMode::kOff)
-      contact.slip_m_per_s = u - u.dot(c.normal) * c.normal;
+    if (contact.mode != ContactMode::kOff) contact.slip_m_per_s = u - u.dot(c.normal) * c.normal;
     out.push_back(contact);
   }
   return out;

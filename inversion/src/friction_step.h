@@ -39,9 +39,9 @@ struct StepOutcome {
 };
 
 /// Solves a step with Coulomb's law in its exact form. With de Saxce's u~ = u + mu |u_T| n the law
-/// says that r lies in the friction cone K, u~ in its dual, at right angles: r = P_K(r - rho u~) for
-/// any rho > 0. As contacts act on single vertices r is what the equation of motion leaves there,
-/// so this is a system in v alone; Newton's method on it, with symmetric matrices
+/// says that r lies in the friction cone K, u~ in its dual, at right angles: r = P_K(r - rho u~)
+/// for any rho > 0. As contacts act on single vertices r is what the equation of motion leaves
+/// there, so this is a system in v alone; Newton's method on it, with symmetric matrices
 /// (docs/resimulation.md).
 class FrictionStep {
  public:

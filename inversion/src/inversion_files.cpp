@@ -6,6 +6,7 @@
 
 #include "tenter/core/files.h"
 #include "tenter/core/mesh_io.h"
+#include "tenter/inversion/problem_file.h"
 #include "vtp_cells.h"
 
 namespace tenter {
@@ -160,16 +161,22 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
 }
 
 const FolderKind& inversionFolder() {
-  static const FolderKind kKind{"certificate.json",
-                                "\"bend_max_rad\"",
-                                {"rest.obj", "pose.vtp", "contacts.vtp", "strains.vtp"}};
+  static const FolderKind kKind{
+      "certificate.json",
+      "\"bend_max_rad\"",
+      {"rest.obj", "pose.vtp", "contacts.vtp", "strains.vtp", kProblemFile}};
   return kKind;
 }
 
 Result<void> writeInversion(const std::filesystem::path& folder, const InversionProblem& problem,
-                            const InversionResult& result, const nlohmann::json& provenance) {
+                            const InversionResult& result, const nlohmann::json& provenance,
+                            const nlohmann::json& asked) {
   return writeFolderAtomically(folder, inversionFolder(), [&](const std::filesystem::path& place) {
     if (auto done = writeMeshes(place, problem, result); !done) return done;
+    if (!asked.is_null()) {
+      if (auto done = writeFileAtomically(place / kProblemFile, asked.dump(2) + "\n"); !done)
+        return done;
+    }
     return writeFileAtomically(place / inversionFolder().marker,
                                certificateToJson(problem, result, provenance).dump(2) + "\n");
   });

@@ -144,8 +144,7 @@ void ShellDynamics::Impl::addContact(StepEquation& e, int vertex, double length_
   c.obstacle = gap.obstacle;
   c.normal = gap.normal;
   c.friction = search.friction(vertex, gap.obstacle);
-  const Vec3 carried =
-      search.obstacle(gap.obstacle).motion.velocityAt(at, time_s + length_s);
+  const Vec3 carried = search.obstacle(gap.obstacle).motion.velocityAt(at, time_s + length_s);
   const Vec3 from = e.from.segment<3>(stepper.firstDof()[vertex]);
   const double normal_speed = -(gap.gap_m + c.normal.dot(from - at)) / e.h_s;
   c.still = carried + (normal_speed - carried.dot(c.normal)) * c.normal;
@@ -262,8 +261,10 @@ Result<ShellDynamics> ShellDynamics::create(const InverseShell& shell, ShellStar
   impl->v = impl->v_before = Eigen::VectorXd::Zero(impl->x.size());
   impl->next_step_s = impl->options.step_s;
   for (const Contact& c : start.contacts) {
-    impl->contacts[static_cast<std::size_t>(c.vertex)].mode = ContactMode::kStuck;
-    impl->contacts[static_cast<std::size_t>(c.vertex)].obstacle = c.obstacle;
+    VertexContact& contact = impl->contacts[static_cast<std::size_t>(c.vertex)];
+    contact.mode = ContactMode::kStuck;
+    contact.obstacle = c.obstacle;
+    contact.gap_m = 0.0;
   }
   return ShellDynamics(std::move(impl));
 }
@@ -310,8 +311,7 @@ void ShellDynamics::displace(const Points3& displacement_m) {
 void ShellDynamics::setVelocities(const Points3& velocities_m_per_s) {
   for (std::size_t v = 0; v < impl_->contacts.size(); ++v) {
     const int dof = impl_->stepper.firstDof()[v];
-    if (dof >= 0)
-      impl_->v.segment<3>(dof) = velocities_m_per_s.col(static_cast<Eigen::Index>(v));
+    if (dof >= 0) impl_->v.segment<3>(dof) = velocities_m_per_s.col(static_cast<Eigen::Index>(v));
   }
   impl_->first_order_steps = 1;
 }

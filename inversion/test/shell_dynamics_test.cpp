@@ -54,9 +54,9 @@ std::vector<MovingObstacle> floorOf(double slope, double friction) {
 TEST(ShellDynamicsTest, AFreeSheetFalls) {
   const TriangleMesh mesh = flatSheet(4, 4);
   const InverseShell shell = InverseShell::create(mesh, reference()).value();
-  auto dynamics = ShellDynamics::create(shell, {mesh.positions, mesh.positions, {}, {}}, {},
-                                        undamped(0.01))
-                      .value();
+  auto dynamics =
+      ShellDynamics::create(shell, {mesh.positions, mesh.positions, {}, {}}, {}, undamped(0.01))
+          .value();
   ASSERT_EQ(dynamics.advanceTo(1.0), AdvanceEnd::kReached);
   const Points3 v = dynamics.velocities();
   const Points3 d = dynamics.positions() - mesh.positions;

@@ -18,9 +18,11 @@ const FolderKind& inversionFolder();
 nlohmann::json certificateToJson(const InversionProblem& problem, const InversionResult& result,
                                  const nlohmann::json& provenance);
 
-/// A folder with rest.obj, pose.vtp, contacts.vtp, strains.vtp and certificate.json: complete or
-/// absent; replaces an older result there.
+/// A folder with rest.obj, pose.vtp, contacts.vtp, strains.vtp, certificate.json and, unless
+/// `asked` is null, problem.json with it (problemToJson): complete or absent; replaces an older
+/// result there.
 Result<void> writeInversion(const std::filesystem::path& folder, const InversionProblem& problem,
-                            const InversionResult& result, const nlohmann::json& provenance);
+                            const InversionResult& result, const nlohmann::json& provenance,
+                            const nlohmann::json& asked = nullptr);
 
 }  // namespace tenter

@@ -11,7 +11,7 @@ namespace tenter {
 /// A rigid motion that starts at time 0 from the place where the obstacle was described, with
 /// constant velocities, and halts.
 struct ObstacleMotion {
-  Vec3 velocity_m_per_s = Vec3::Zero();          ///< Of the pivot.
+  Vec3 velocity_m_per_s = Vec3::Zero();  ///< Of the pivot.
   Vec3 angular_velocity_rad_per_s = Vec3::Zero();
   Vec3 pivot_m = Vec3::Zero();  ///< Its place at time 0.
   double halt_s = std::numeric_limits<double>::infinity();
@@ -19,7 +19,7 @@ struct ObstacleMotion {
   bool moves() const {
     return !velocity_m_per_s.isZero(0.0) || !angular_velocity_rad_per_s.isZero(0.0);
   }
-  Eigen::Isometry3d pose(double time_s) const;  ///< world_from_obstacle.
+  Eigen::Isometry3d pose(double time_s) const;                ///< world_from_obstacle.
   Vec3 velocityAt(const Vec3& place_m, double time_s) const;  ///< [m/s].
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -21,10 +22,10 @@ struct AirSetup {
 };
 
 struct DynamicsOptions {
-  double step_s = 0.01;              ///< Longest time step.
-  double mass_damping_per_s = 0.5;   ///< Rayleigh's: force -alpha M v.
-  double stiffness_damping_s = 2e-3; ///< Rayleigh's: force -beta K v, K without negative parts.
-  std::optional<AirSetup> air;       ///< None: vacuum.
+  double step_s = 0.01;               ///< Longest time step.
+  double mass_damping_per_s = 0.5;    ///< Rayleigh's: force -alpha M v.
+  double stiffness_damping_s = 2e-3;  ///< Rayleigh's: force -beta K v, K without negative parts.
+  std::optional<AirSetup> air;        ///< None: vacuum.
   /// Second order in time where contacts do not change; otherwise backward Euler throughout.
   bool second_order = true;
   std::function<bool()> stop;  ///< Polled once a step and once an iteration.
@@ -42,9 +43,10 @@ enum class ContactMode { kOff, kStuck, kSliding };
 /// What one vertex does at an obstacle.
 struct VertexContact {
   ContactMode mode = ContactMode::kOff;
-  Vec3 force_N = Vec3::Zero();         ///< On the shell.
-  Vec3 slip_m_per_s = Vec3::Zero();    ///< Tangential, relative to the obstacle.
+  Vec3 force_N = Vec3::Zero();       ///< On the shell.
+  Vec3 slip_m_per_s = Vec3::Zero();  ///< Tangential, relative to the obstacle.
   int obstacle = -1;
+  double gap_m = std::numeric_limits<double>::infinity();  ///< Infinite where nothing is near.
 };
 
 enum class AdvanceEnd { kReached, kStopped, kStuckInTime };
@@ -66,12 +68,12 @@ class ShellDynamics {
   AdvanceEnd advanceTo(double time_s);
 
   double time_s() const;
-  Points3 positions() const;   ///< 3 x vertices [m].
-  Points3 velocities() const;  ///< 3 x vertices [m/s].
+  Points3 positions() const;                     ///< 3 x vertices [m].
+  Points3 velocities() const;                    ///< 3 x vertices [m/s].
   void displace(const Points3& displacement_m);  ///< Of free vertices; before the first step.
   void setVelocities(const Points3& velocities_m_per_s);  ///< Of free vertices.
   const std::vector<VertexContact>& contacts() const;     ///< One a vertex.
-  double energy_J() const;          ///< Kinetic, elastic and of weight.
+  double energy_J() const;                                ///< Kinetic, elastic and of weight.
   double kineticEnergy_J() const;
 
   struct Counts {
