@@ -274,8 +274,8 @@ StepOutcome FrictionStep::solve(const StepEquation& e, ClothState& state, Eigen:
   v = best_v;
   evaluate(e, v, state, now);
   out.residual_N = now.largest;
-  out.converged = now.largest <= tolerance_N_ ||
-                  (out.iterations > 0 && now.largest <= kRoundingShare * tolerance_N_);
+  const double enough = out.iterations > 0 ? kRoundingShare * tolerance_N_ : tolerance_N_;
+  out.converged = std::isfinite(now.norm) && now.largest <= enough;
   out.contacts = contactsAt(e, v, now);
   return out;
 }

@@ -19,11 +19,10 @@ using Clock = std::chrono::steady_clock;
 constexpr double kTouching = 1e-6;
 
 /// Vertices that fixed places and contacts with a force hold.
-Result<std::vector<int>> heldVertices(const InverseShell& shell, const ShellStart& start) {
+Result<std::vector<int>> heldVertices(const InverseShell& shell, const ShellStart& start,
+                                      const Eigen::VectorXd& q) {
   auto system = shell.system(start.rest, start.fixed);
   if (!system) return system.error();
-  const Eigen::VectorXd q =
-      shell.coordinates(start.pose, Eigen::VectorXd::Zero(shell.rotationCount()));
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(q.size());
   for (const auto& term : system->terms()) term->addGradient(q, gradient);
   std::vector<int> held = start.fixed;
@@ -35,13 +34,13 @@ Result<std::vector<int>> heldVertices(const InverseShell& shell, const ShellStar
 
 /// No value where the pose is not stable, or nothing is free.
 std::optional<LinearResponse> linearResponse(const InverseShell& shell, const ShellStart& start,
-                                             const Vec3& gravity_change) {
-  const auto held = heldVertices(shell, start);
+                                             const Eigen::VectorXd& q, const Vec3& gravity_change) {
+  const auto held = heldVertices(shell, start, q);
   if (!held || static_cast<int>(held->size()) == shell.vertexCount()) return {};
   const auto system = shell.system(start.rest, *held);
   if (!system) return {};
   ClothState state = system->restState();
-  state.q.head(3 * shell.vertexCount()) = start.pose.reshaped();
+  state.q = q;
   SparseCholesky cholesky(system->hessian(state, Projection::kNone));
   if (!cholesky.factorize(system->hessian(state, Projection::kNone))) return {};
   // Free vertices come first among the degrees of freedom; rotations have no mass.
@@ -100,11 +99,14 @@ class Run {
     const Vec3 gravity = problem.material.gravity_m_per_s2;
     out_.size_m = sizeOf(start.pose);
     out_.weight_N = shell->weight_N(start.rest);
-    if (options_.gravity_scale != 1.0 && !options_.rest_is_target)
-      out_.linear = linearResponse(*shell, start, (options_.gravity_scale - 1.0) * gravity);
     shell->setGravity(options_.gravity_scale * gravity);
     auto dynamics = ShellDynamics::create(*shell, start, obstaclesOf(inversion), dynamicsOptions());
     if (!dynamics) return dynamics.error();
+    shell->setGravity(gravity);
+    if (options_.gravity_scale != 1.0 && !options_.rest_is_target) {
+      out_.linear = linearResponse(*shell, start, dynamics->coordinates(),
+                                   (options_.gravity_scale - 1.0) * gravity);
+    }
     if (options_.perturbation_rel > 0.0) displace(*dynamics, start);
     if (auto done = march(*dynamics); !done) return done.error();
     finish(*dynamics, start);

@@ -293,6 +293,7 @@ AdvanceEnd ShellDynamics::advanceTo(double until_s) {
 
 double ShellDynamics::time_s() const { return impl_->time_s; }
 Points3 ShellDynamics::positions() const { return impl_->positions(); }
+Eigen::VectorXd ShellDynamics::coordinates() const { return impl_->state.q; }
 Points3 ShellDynamics::velocities() const { return impl_->stepper.spread(impl_->v); }
 const std::vector<VertexContact>& ShellDynamics::contacts() const { return impl_->contacts; }
 const ShellDynamics::Counts& ShellDynamics::counts() const { return impl_->counts; }

@@ -53,56 +53,100 @@ TEST(ClosedFormsTest, AStripWithoutBendingHangsAsACatenary) {
   }
 }
 
-/// Smallest eigenvalue of the certificate for an upright sheet of height 1 above its clamp.
-double uprightLambda(int rows, double gamma) {
-  constexpr double kB = 1e-3;
-  const double edge_m = 1.0 / (rows - 1);
-  const TriangleMesh flat = strip(rows + 1, 3, 1.0 + edge_m, 4.0 * edge_m);
-  TriangleMesh mesh = flat;
-  for (int v = 0; v < mesh.vertexCount(); ++v)
-    mesh.positions.col(v) = Vec3(0.0, flat.positions(1, v), flat.positions(0, v) - edge_m);
-  const ClothModel* model = findClothModel("stvk").value();
-  std::vector<ComponentCurve> curves;
-  for (int i = 0; i < model->componentCount(); ++i) {
-    const bool bending = model->component(i).stiffness_unit == "N m";
-    ComponentCurve c;
-    c.curve = StiffnessCurve::constant(bending ? kB : 1e4, model->component(i).even);
-    curves.push_back(std::move(c));
-  }
-  const double density = gamma * kB / kStandardGravity_m_per_s2;
-  const InverseShell shell =
-      InverseShell::create(mesh, {model, makeLaws(*model, curves), density, kDefaultGravity})
-          .value();
+/// Gamma = rho g L^3 / B at which an upright sheet buckles under its own weight [Greenhill81].
+constexpr double kGreenhill = 7.8373;
+constexpr double kB_Nm = 1e-3;
+
+/// An upright sheet of height 1 above its clamp: two rows of vertices, the upper at height 0.
+struct Upright {
+  TriangleMesh mesh;
   std::vector<int> fixed;
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 2; ++column) fixed.push_back((rows + 1) * row + column);
-  const ClothSystem system = shell.system(mesh.positions, fixed).value();
-  ClothState state = system.restState();
+  ShellMaterial material;
+
+  Upright(int rows, double gamma) {
+    const double edge_m = 1.0 / (rows - 1);
+    mesh = strip(rows + 1, 3, 1.0 + edge_m, 4.0 * edge_m);
+    for (int v = 0; v < mesh.vertexCount(); ++v)
+      mesh.positions.col(v) = Vec3(0.0, mesh.uv(1, v), mesh.uv(0, v) - edge_m);
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 2; ++column) fixed.push_back((rows + 1) * row + column);
+    const ClothModel* model = findClothModel("stvk").value();
+    std::vector<ComponentCurve> curves;
+    for (int i = 0; i < model->componentCount(); ++i) {
+      const bool bending = model->component(i).stiffness_unit == "N m";
+      ComponentCurve c;
+      c.curve = StiffnessCurve::constant(bending ? kB_Nm : 1e4, model->component(i).even);
+      curves.push_back(std::move(c));
+    }
+    material = {model, makeLaws(*model, curves), gamma * kB_Nm / kStandardGravity_m_per_s2,
+                kDefaultGravity};
+  }
+};
+
+/// The upright equilibrium, stable or not.
+EquilibriumSummary standUpright(const ClothSystem& system, ClothState& state) {
   EquilibriumOptions options;
   options.leave_saddles = false;
+  options.compute_lambda_min = true;
   const EquilibriumSummary summary = EquilibriumSolver(system).solve(state, options);
   EXPECT_TRUE(summary.converged());
-  const Points3 pose = state.positions(mesh.vertexCount());
-  EXPECT_NEAR(pose.row(0).cwiseAbs().maxCoeff(), 0.0, 1e-9) << "it stands upright";
-  CertificateOptions certificate;
-  certificate.redrapes = 0;
-  const Certificate c = certify(shell, pose, mesh.positions, state.q.tail(shell.rotationCount()),
-                                fixed, {}, certificate)
-                            .value();
+  const auto count = static_cast<int>(system.sheet().nodeCount());
+  EXPECT_NEAR(state.positions(count).row(0).cwiseAbs().maxCoeff(), 0.0, 1e-9);
+  return summary;
+}
+
+/// Smallest eigenvalue as the certificate has it.
+double certifiedLambda(int rows, double gamma) {
+  const Upright sheet(rows, gamma);
+  const InverseShell shell = InverseShell::create(sheet.mesh, sheet.material).value();
+  const ClothSystem system = shell.system(sheet.mesh.positions, sheet.fixed).value();
+  ClothState state = system.restState();
+  standUpright(system, state);
+  CertificateOptions options;
+  options.redrapes = 0;
+  const Certificate c =
+      certify(shell, state.positions(sheet.mesh.vertexCount()), sheet.mesh.positions,
+              state.q.tail(shell.rotationCount()), sheet.fixed, {}, options)
+          .value();
   EXPECT_EQ(c.negative_eigenvalues > 0, c.lambda_min_per_s2 < 0.0);
+  EXPECT_EQ(c.stable(), c.lambda_min_per_s2 > 0.0);
   return c.lambda_min_per_s2;
 }
 
-TEST(ClosedFormsTest, PrintCritical) {
-  for (const int rows : {11, 21, 41}) {
-    double low = 5.0, high = 10.0;
-    for (int k = 0; k < 14; ++k) {
-      const double mid = 0.5 * (low + high);
-      (uprightLambda(rows, mid) > 0.0 ? low : high) = mid;
-    }
-    const double h = 1.0 / (rows - 1);
-    std::printf("rows %d critical %.5f, with half edge %.5f\n", rows, low,
-                low * std::pow(1.0 + 0.5 * h, 3));
+double criticalGamma(int rows) {
+  double low = 5.0, high = 10.0;
+  while (high - low > 1e-3) {
+    const double middle = 0.5 * (low + high);
+    (certifiedLambda(rows, middle) > 0.0 ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// For the certificate no triangle is rigid, so the clamp line is as soft as any other: the sheet
+/// buckles as if it were longer by a share of an edge, an error of first order.
+TEST(ClosedFormsTest, TheCertificateChangesSignWhereAnUprightSheetBuckles) {
+  const double g10 = criticalGamma(11), g20 = criticalGamma(21), g40 = criticalGamma(41);
+  const double first = 2.0 * g40 - g20, coarser = 2.0 * g20 - g10;
+  EXPECT_NEAR(first, kGreenhill, 0.005 * kGreenhill) << "first order taken out";
+  EXPECT_NEAR((4.0 * first - coarser) / 3.0, kGreenhill, 0.002 * kGreenhill) << "second too";
+  EXPECT_NEAR(g40, kGreenhill, 0.06 * kGreenhill);
+}
+
+/// The clamp line of the mechanics is stiff: half a hinge.
+TEST(ClosedFormsTest, TheSmallestEigenvalueChangesSignWithinAPercent) {
+  for (const double gamma : {0.99 * kGreenhill, 1.01 * kGreenhill}) {
+    const Upright sheet(21, gamma);
+    SystemSetup setup;
+    setup.areal_density_kg_per_m2 = sheet.material.areal_density_kg_per_m2;
+    setup.fixed_nodes = sheet.fixed;
+    const ClothSystem system =
+        ClothSystem::create(sheetFromMesh(sheet.mesh, false).value(), *sheet.material.model,
+                            sheet.material.laws, setup)
+            .value();
+    ClothState state = system.restState();
+    const EquilibriumSummary summary = standUpright(system, state);
+    EXPECT_EQ(summary.lambda_min_per_s2 > 0.0, gamma < kGreenhill) << gamma;
+    EXPECT_EQ(summary.stable, gamma < kGreenhill) << gamma;
   }
 }
 

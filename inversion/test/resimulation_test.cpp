@@ -168,6 +168,29 @@ TEST_F(ResimulationTest, FilesAreCompleteAndAStoppedRunKeepsItsFrames) {
   EXPECT_NE(test_support::slurp(places.pvd).find(places.first_frame), std::string::npos);
 }
 
+TEST_F(ResimulationTest, AMeshObstacleGoesWithTheFolder) {
+  test_support::TemporaryFolder copy;
+  std::filesystem::copy(*folder_ / "arch", copy / "arch");
+  const auto floor =
+      copy.write("floor.obj", "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nv -2 2 0\nf 1 2 3\nf 1 3 4\n");
+  const auto json =
+      problemToJson({twoConstants(2.0), kDefaultGravity, 0.4, {}, {floor.string()}}).value();
+  EXPECT_EQ(test_support::schemaErrors(
+                json, test_support::sourceFolder() / "docs/formats/problem.schema.json"),
+            std::vector<std::string>{});
+  ASSERT_TRUE(writeFileAtomically(copy / "arch/problem.json", json.dump()).ok());
+  std::filesystem::remove(floor);
+  auto read = readInversion(copy / "arch");
+  ASSERT_TRUE(read.ok()) << read.error().message();
+  ResimulationOptions options;
+  options.seconds = 0.5;
+  const auto summary = resimulate(std::move(read).value(), options,
+                                  [](const ResimulationFrame&) { return Result<void>(); });
+  ASSERT_TRUE(summary.ok());
+  EXPECT_LE(summary->max_displacement_rel, 1e-8);
+  EXPECT_EQ(summary->stuck, 20);
+}
+
 TEST_F(ResimulationTest, FoldersThatDoNotFitTogetherAreRefused) {
   const auto brokenBy = [&](const char* file, const auto& change) {
     test_support::TemporaryFolder copy;

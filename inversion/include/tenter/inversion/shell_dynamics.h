@@ -70,6 +70,7 @@ class ShellDynamics {
   double time_s() const;
   Points3 positions() const;                     ///< 3 x vertices [m].
   Points3 velocities() const;                    ///< 3 x vertices [m/s].
+  Eigen::VectorXd coordinates() const;           ///< Positions, then edge rotations (InverseShell).
   void displace(const Points3& displacement_m);  ///< Of free vertices; before the first step.
   void setVelocities(const Points3& velocities_m_per_s);  ///< Of free vertices.
   const std::vector<VertexContact>& contacts() const;     ///< One a vertex.
