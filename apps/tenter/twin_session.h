@@ -13,8 +13,8 @@ struct SessionCapture {
   MountOptions mount;
   bool tcp = true;
   CameraSourceOptions cameras;  ///< Their number is 0: no images.
-  std::string output;  ///< Folder of the session.
-  std::string truth;   ///< Folder for what hung there and how it pulled; empty: not kept.
+  std::string output;           ///< Folder of the session.
+  std::string truth;            ///< Folder for what hung there and how it pulled; empty: not kept.
 };
 
 /// Serves a virtual rig, starts the daemon on it, runs the mount's protocol into a session, and

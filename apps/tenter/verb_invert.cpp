@@ -14,6 +14,7 @@
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
 #include "tenter/inversion/material_directions.h"
+#include "tenter/inversion/problem_file.h"
 #include "verbs.h"
 #include "vertex_selection.h"
 
@@ -126,6 +127,13 @@ Result<InversionProblem> problemOf(const Options& o, const Console& console) {
   return problem;
 }
 
+Result<nlohmann::json> askedOf(const Options& o, const InversionProblem& problem) {
+  auto material = materialOf(o.material);
+  if (!material) return material.error();
+  return problemToJson({std::move(material).value(), problem.material.gravity_m_per_s2, o.friction,
+                        problem.fixed, o.obstacles});
+}
+
 nlohmann::json provenanceOf(const Options& o) {
   return {{"program", std::string("tenter ") + TENTER_VERSION},
           {"target", o.target},
@@ -177,8 +185,9 @@ std::string shown(const std::optional<double>& factor) {
 
 Result<int> finish(const Options& o, const InversionProblem& problem, const InversionResult& result,
                    const FeasibleRange* range, Console& console) {
-  auto provenance = provenanceOf(o);
-  if (auto done = writeInversion(o.output, problem, result, provenance, range); !done)
+  const auto asked = askedOf(o, problem);
+  if (!asked) return asked.error();
+  if (auto done = writeInversion(o.output, problem, result, provenanceOf(o), *asked, range); !done)
     return done.error();
   tell(o, problem, result, range, console);
   if (range != nullptr) {

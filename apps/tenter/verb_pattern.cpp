@@ -4,6 +4,7 @@
 
 #include "board_options.h"
 #include "output_guard.h"
+#include "pattern_flat.h"
 #include "tenter/calib/print_page.h"
 #include "tenter/core/files.h"
 #include "verbs.h"
@@ -123,7 +124,8 @@ Result<int> printTexture(const TexturePrint& o, Console& console) {
 }  // namespace
 
 Verb patternVerb() {
-  static constexpr std::array kRows = {
+  static const std::array kRows = {
+      flatPattern(),
       Verb{"board", "A chessboard or ChArUco board to calibrate cameras with",
            [](CLI::App& c, Action& a) {
              setUpCommand<BoardPrint>(c, a, declareBoardPrint, printBoard);
@@ -132,7 +134,7 @@ Verb patternVerb() {
            [](CLI::App& c, Action& a) {
              setUpCommand<TexturePrint>(c, a, declareTexturePrint, printTexture);
            }}};
-  return {"pattern", "Boards and textures to print at true scale, as PDF and PNG",
+  return {"pattern", "Boards and textures to print, and patterns to cut, at true scale",
           [](CLI::App& command, Action& action) {
             command.require_subcommand(1);
             addSubcommands(command, kRows, action);

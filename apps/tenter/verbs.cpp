@@ -7,12 +7,12 @@ namespace tenter::app {
 
 std::span<const Verb> verbs() {
   static const std::array kVerbs = {
-      importVerb(),    fitVerb(),         evaluateVerb(),  materialVerb(),
-      exportVerb(),    drapeVerb(),       invertVerb(),    twinVerb(),
-      protocolVerb(),  sessionVerb(),     calibrateVerb(), patternVerb(),
-      correlateVerb(), reconstructVerb(), demoVerb(),      versionVerb(),
+      importVerb(),  fitVerb(),       evaluateVerb(),   materialVerb(),  exportVerb(),
+      drapeVerb(),   invertVerb(),    resimulateVerb(), twinVerb(),      protocolVerb(),
+      sessionVerb(), calibrateVerb(), patternVerb(),    correlateVerb(), reconstructVerb(),
+      demoVerb(),    versionVerb(),
 #ifdef TENTER_HARDWARE
-      rigVerb(),       camerasVerb(),
+      rigVerb(),     camerasVerb(),
 #endif
   };
   return kVerbs;

@@ -15,6 +15,7 @@ Verb drapeVerb();
 Verb calibrateVerb();
 Verb patternVerb();
 Verb invertVerb();
+Verb resimulateVerb();
 Verb twinVerb();
 Verb protocolVerb();
 Verb sessionVerb();

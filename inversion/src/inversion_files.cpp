@@ -7,6 +7,7 @@
 #include "tenter/core/files.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/material_directions.h"
+#include "tenter/inversion/problem_file.h"
 #include "vtp_cells.h"
 
 namespace tenter {
@@ -187,17 +188,22 @@ nlohmann::json rangeToJson(const FeasibleRange& range) {
 }
 
 const FolderKind& inversionFolder() {
-  static const FolderKind kKind{"certificate.json",
-                                "\"bend_max_rad\"",
-                                {"rest.obj", "pose.vtp", "contacts.vtp", "strains.vtp"}};
+  static const FolderKind kKind{
+      "certificate.json",
+      "\"bend_max_rad\"",
+      {"rest.obj", "pose.vtp", "contacts.vtp", "strains.vtp", kProblemFile}};
   return kKind;
 }
 
 Result<void> writeInversion(const std::filesystem::path& folder, const InversionProblem& problem,
                             const InversionResult& result, const nlohmann::json& provenance,
-                            const FeasibleRange* range) {
+                            const nlohmann::json& asked, const FeasibleRange* range) {
   return writeFolderAtomically(folder, inversionFolder(), [&](const std::filesystem::path& place) {
     if (auto done = writeMeshes(place, problem, result); !done) return done;
+    if (!asked.is_null()) {
+      if (auto done = writeFileAtomically(place / kProblemFile, asked.dump(2) + "\n"); !done)
+        return done;
+    }
     return writeFileAtomically(
         place / inversionFolder().marker,
         certificateToJson(problem, result, provenance, range).dump(2) + "\n");

@@ -199,7 +199,8 @@ Result<RigConfig> parse(std::string_view toml, const std::string& file,
   const auto json = jsonOfToml(toml, file);
   if (!json) return json.error();
   JsonReader in(*json, file);
-  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell", "cameras", "calibration"}, kPage);
+  onlyKnownKeys(in, {"schema_version", "name", "limits", "axis", "cell", "cameras", "calibration"},
+                kPage);
   in.integer("schema_version", 1, 1);
   RigConfig rig;
   rig.text = toml;

@@ -20,10 +20,12 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
                                  const FeasibleRange* range = nullptr);
 nlohmann::json rangeToJson(const FeasibleRange& range);
 
-/// A folder with rest.obj, pose.vtp, contacts.vtp, strains.vtp and certificate.json: complete or
-/// absent; replaces an older result there.
+/// A folder with rest.obj, pose.vtp, contacts.vtp, strains.vtp, certificate.json and, unless
+/// `asked` is null, problem.json with it (problemToJson): complete or absent; replaces an older
+/// result there.
 Result<void> writeInversion(const std::filesystem::path& folder, const InversionProblem& problem,
                             const InversionResult& result, const nlohmann::json& provenance,
+                            const nlohmann::json& asked = nullptr,
                             const FeasibleRange* range = nullptr);
 
 }  // namespace tenter
