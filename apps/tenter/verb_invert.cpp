@@ -185,8 +185,10 @@ std::string shown(const std::optional<double>& factor) {
 
 Result<int> finish(const Options& o, const InversionProblem& problem, const InversionResult& result,
                    const FeasibleRange* range, Console& console) {
-  const auto asked = askedOf(o, problem);
+  auto asked = askedOf(o, problem);
   if (!asked) return asked.error();
+  // The files that were named do not hold a material that the search has scaled.
+  if (range != nullptr && range->result_stiffness != 1.0) *asked = nullptr;
   if (auto done = writeInversion(o.output, problem, result, provenanceOf(o), *asked, range); !done)
     return done.error();
   tell(o, problem, result, range, console);

@@ -263,7 +263,7 @@ TEST(InversionTest, FilesAgreeWithTheSchemaAndReadBack) {
                                       "strains.vtp"}));
   const auto range = findFeasibleRange(problem, {});
   ASSERT_TRUE(
-      writeInversion(folder / "range", problem, range->result, {{"program", "test"}}, &*range)
+      writeInversion(folder / "range", problem, range->result, {{"program", "test"}}, nullptr, &*range)
           .ok());
   EXPECT_EQ(test_support::schemaErrors(
                 nlohmann::json::parse(test_support::slurp(folder / "range/certificate.json")),

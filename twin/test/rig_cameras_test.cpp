@@ -58,7 +58,8 @@ TEST(RigMountingTest, AgreesWithTheCapture) {
 
 TEST(RigCamerasTest, AllOfThemSeeTheWholeSampleAtRest) {
   for (const ProtocolInfo& protocol : protocols()) {
-    for (const VirtualCamera& camera : rigCameras({std::string(protocol.id), 4, 1936, 7}).value()) {
+    const auto cameras = rigCameras({std::string(protocol.id), 4, 1936, 7});
+    for (const VirtualCamera& camera : cameras.value()) {
       for (const Vec3& corner :
            {Vec3(0.0, 0.0, 0.0), Vec3(0.1, 0.0, 0.0), Vec3(0.0, 0.1, 0.0), Vec3(0.1, 0.1, 0.0)}) {
         const auto pixel = camera.model.project(camera.camera_from_rig * corner);
