@@ -262,9 +262,9 @@ TEST(InversionTest, FilesAgreeWithTheSchemaAndReadBack) {
             (std::vector<std::string>{"certificate.json", "contacts.vtp", "pose.vtp", "rest.obj",
                                       "strains.vtp"}));
   const auto range = findFeasibleRange(problem, {});
-  ASSERT_TRUE(
-      writeInversion(folder / "range", problem, range->result, {{"program", "test"}}, nullptr, &*range)
-          .ok());
+  ASSERT_TRUE(writeInversion(folder / "range", problem, range->result, {{"program", "test"}},
+                             nullptr, &*range)
+                  .ok());
   EXPECT_EQ(test_support::schemaErrors(
                 nlohmann::json::parse(test_support::slurp(folder / "range/certificate.json")),
                 test_support::sourceFolder() / "docs/formats/certificate.schema.json"),

@@ -49,7 +49,7 @@ DepthErrors depthErrors(const RestSurface& surface) {
   return errors;
 }
 
-TEST(RestSurface, TwoViewsSeeWrinklesToATwentiethOfAPixel) {
+TEST(RestSurface, TwoViewsSeeWrinklesFourTimesBetterThanSemiGlobalMatching) {
   auto views = fourCameras();
   views.erase(views.begin() + 2, views.end());
   Scene scene{wrinkled};
@@ -71,9 +71,9 @@ TEST(RestSurface, TwoViewsSeeWrinklesToATwentiethOfAPixel) {
     const double e = p.position_m.z() - wrinkled(p.position_m.head<2>()).z();
     sum += std::min(e * e, 1e-6);
   }
-  std::printf("semi-global: %zu points rms %.4f mm\n", coarse->size(),
-              1e3 * std::sqrt(sum / double(coarse->size())));
-  EXPECT_LE(errors.rms_m, 0.012e-3);
+  const double coarse_rms_m = std::sqrt(sum / double(coarse->size()));
+  std::printf("semi-global: %zu points rms %.4f mm\n", coarse->size(), 1e3 * coarse_rms_m);
+  EXPECT_LE(errors.rms_m, 0.25 * coarse_rms_m);
 }
 
 }  // namespace

@@ -22,6 +22,8 @@ struct Scene {
   double noise = 2.0;            ///< [grey levels].
 };
 
+inline constexpr int kRaysASide = 2;  ///< Of a pixel.
+
 inline double wave(double x, double length) {
   return std::sin(2.0 * std::numbers::pi * x / length);
 }
@@ -88,11 +90,18 @@ inline GrayImage photograph(const Scene& scene, const CameraView& view,
   for (int y = 0; y < image.height; ++y) {
     Vec2 last = 0.5 * scene.size_m;
     for (int x = 0; x < image.width; ++x) {
-      const Vec2 uv = materialSeen(view, scene.surface, Vec2(x, y), last);
-      const bool on =
-          uv.allFinite() && (uv.array() >= 0.0).all() && (uv.array() <= scene.size_m.array()).all();
-      image.at(x, y) = on ? static_cast<float>(texture.at(uv / scene.texture_m)) : 60.0F;
-      if (uv.allFinite()) last = uv;
+      // A pixel sees the light of all its area.
+      double sum = 0.0;
+      for (int ray = 0; ray < kRaysASide * kRaysASide; ++ray) {
+        const Vec2 within((ray % kRaysASide + 0.5) / kRaysASide - 0.5,
+                          (ray / kRaysASide + 0.5) / kRaysASide - 0.5);
+        const Vec2 uv = materialSeen(view, scene.surface, Vec2(x, y) + within, last);
+        const bool on = uv.allFinite() && (uv.array() >= 0.0).all() &&
+                        (uv.array() <= scene.size_m.array()).all();
+        sum += on ? texture.at(uv / scene.texture_m) : 60.0;
+        if (uv.allFinite()) last = uv;
+      }
+      image.at(x, y) = static_cast<float>(sum / (kRaysASide * kRaysASide));
     }
   }
   return photographed(std::move(image), scene.noise, seed);

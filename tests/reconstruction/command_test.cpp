@@ -140,12 +140,6 @@ TEST_F(ReconstructCommand, RefusesImagesOfAnotherSize) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "m"));
 }
 
-TEST_F(ReconstructCommand, RefusesCamerasThatWereExchanged) {
-  const Outcome outcome = run({"--camera", "left=right", "--camera", "right=left"});
-  EXPECT_EQ(outcome.exit_code, 3) << outcome.out;
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "m"));
-}
-
 TEST_F(ReconstructCommand, AsksForWhatItNeeds) {
   EXPECT_EQ(tenter({"reconstruct", "-o", "m"}, folder_.path()).exit_code, 2);
   EXPECT_EQ(run({"--camera", "left"}).exit_code, 2);

@@ -33,7 +33,11 @@ TEST(SpecimenTest, ASessionsForcesAreTheSpecimensAndThePulleys) {
   constexpr double kOtherFabric_N = 20e-3;
   RunningRig running;
   const std::string session = running.path("session");
-  ASSERT_EQ(running.tenterRig({"run", running.write("p.toml", kStretch), "-o", session}), 0)
+  // A check of the mapping rubs the cords to and fro first: by travel alone nobody knows then which
+  // way their friction points.
+  ASSERT_EQ(running.tenterRig({"run", running.write("p.toml", kStretch), "--skip-mapping-check",
+                               "-o", session}),
+            0)
       << test_support::slurp(running.path("out"));
   ASSERT_TRUE(verifySession(session)->ok());
   const auto mount = readMount(running.path("mount.json"));

@@ -86,8 +86,8 @@ TEST(InvertCommand, AFittedFabricOnASphereIsCertified) {
   EXPECT_GT(answer.at("lambda_min_per_s2").get<double>(), 0.0);
   EXPECT_LE(answer.at("redrape_max_rel").get<double>(), 1e-6);
   EXPECT_THAT(test_support::listFolder(folder / "DIR"),
-              ::testing::ElementsAre("certificate.json", "contacts.vtp", "pose.vtp", "rest.obj",
-                                     "strains.vtp"));
+              ::testing::ElementsAre("certificate.json", "contacts.vtp", "pose.vtp", "problem.json",
+                                     "rest.obj", "strains.vtp"));
 }
 
 TEST(InvertCommand, WithoutMaterialCoordinatesTheWarpIsSaid) {

@@ -115,20 +115,29 @@ Vec2 darknessInPicture(const ByteImage& image, const VirtualCamera& camera,
 
 TEST(SceneRendererTest, TagsAreWhereTheirClipsAre) {
   const auto cameras = someCameras();
-  const auto renderer = rendererOf("stretch-weft", cameras, clean());
+  RenderOptions fine = clean();
+  fine.samples = 8;  // what few would scatter is not what is asked
+  const auto renderer = rendererOf("stretch-weft", cameras, fine);
   const Mounting mounting = rigMounting("knit-12", "stretch-weft").value();
   const SheetShape shape = flatShape(tilt(), mounting.clips.size());
   const auto images = renderer->render(shape, 0);
+  // Light that falls off across a tag moves its centroid of darkness a little to either side.
+  constexpr double kOneTag_px = 0.05;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
+    Vec2 sum = Vec2::Zero();
+    int count = 0;
     for (const MountedClip& clip : mounting.clips) {
       for (const ClipTag& tag : clip.tags) {
         const Eigen::Isometry3d pose = tilt() * tag.clip_from_tag;
         const Vec2 seen = darknessInPicture(images[c], cameras[c], pose, tag);
         const Vec2 expected = darknessByProjection(cameras[c], pose, tag);
-        EXPECT_NEAR((seen - expected).norm(), 0.0, kSubpixelTolerance)
+        EXPECT_NEAR((seen - expected).norm(), 0.0, kOneTag_px)
             << cameras[c].name << ", tag " << tag.id << ": " << (seen - expected).transpose();
+        sum += seen - expected;
+        ++count;
       }
     }
+    EXPECT_NEAR((sum / count).norm(), 0.0, kSubpixelTolerance) << cameras[c].name;
   }
 }
 
@@ -199,7 +208,9 @@ TEST(SceneRendererTest, ThreadsDoNotMatter) {
 
 TEST(SceneRendererTest, ExposureSaturatesAndFocusBlurs) {
   auto cameras = rigCameras({"shear", 2, 320, 3}).value();
-  const auto renderer = rendererOf("shear", cameras, clean());
+  RenderOptions fine = clean();
+  fine.samples = 8;  // a wide aperture through few rays is noise
+  const auto renderer = rendererOf("shear", cameras, fine);
   const SheetShape shape = flatShape(Eigen::Isometry3d::Identity(), 4);
   const auto contrast = [](const ByteImage& image) {
     double sum = 0.0;
