@@ -29,8 +29,8 @@ class Pair {
         reference_ends_(reference),
         deformed_ends_(deformed),
         judge_(reference_ends_, deformed_ends_, options) {
-    warnOfImages(reference_ends_, deformed_ends_, sharpnessOf(reference), sharpnessOf(deformed),
-                 warnings);
+    warnOfImages(reference_ends_.share(), deformed_ends_.share(), sharpnessOf(reference),
+                 sharpnessOf(deformed), warnings);
   }
 
   std::vector<CorrelatedPoint> matchGrid(const PointGrid& grid) {

@@ -55,16 +55,15 @@ Result<void> checkPoints(const GrayImage& reference, const std::vector<Vec2>& po
   return {};
 }
 
-void warnOfImages(const SaturationMap& reference, const SaturationMap& deformed,
-                  double reference_sharpness, double deformed_sharpness,
-                  std::vector<std::string>& warnings) {
+void warnOfImages(double reference_saturated, double deformed_saturated, double reference_sharpness,
+                  double deformed_sharpness, std::vector<std::string>& warnings) {
   const auto ends = [&](const std::string& which, double share) {
     if (share < kSaturatedImage) return;
     warnings.push_back(percent(share) + " of " + which +
                        " is saturated, at the black or the white end");
   };
-  ends("the reference", reference.share());
-  ends("the deformed image", deformed.share());
+  ends("the reference", reference_saturated);
+  ends("the deformed image", deformed_saturated);
   const auto blur = [&](const std::string& which, double sharpness, double other) {
     if (!(other > 0.0) || sharpness / other >= kBlurred) return;
     warnings.push_back(which +

@@ -15,9 +15,9 @@ Result<void> checkPair(const GrayImage& reference, const GrayImage& deformed,
 /// Error unless there are points and all lie in the image.
 Result<void> checkPoints(const GrayImage& reference, const std::vector<Vec2>& points);
 
-/// Adds what is wrong with a pair of images as a whole: saturation, and sharpness that differs.
-void warnOfImages(const SaturationMap& reference, const SaturationMap& deformed,
-                  double reference_sharpness, double deformed_sharpness,
-                  std::vector<std::string>& warnings);
+/// Adds what is wrong with a pair of images as a whole: shares of what counts in them that are
+/// saturated, and sharpness that differs.
+void warnOfImages(double reference_saturated, double deformed_saturated, double reference_sharpness,
+                  double deformed_sharpness, std::vector<std::string>& warnings);
 
 }  // namespace tenter

@@ -180,9 +180,17 @@ Result<CorrelationField> PointTracker::track(const GrayImage& image) {
   const SplineImage deformed(image);
   const SaturationMap ends(image);
   const MatchJudge judge(s.ends, ends, s.options);
-  warnOfImages(s.ends, ends, s.sharpness, sharpnessOf(image), field.warnings);
   cv::Mat next = eightBits(image);
   const std::vector<SubsetWarp> guesses = s.predict(next);
+  // What lies behind the cloth may be as dark as it likes.
+  double before = 0.0, after = 0.0;
+  const double per_point = 1.0 / static_cast<double>(s.points.size());
+  for (std::size_t i = 0; i < s.points.size(); ++i) {
+    const int side_px = s.options.match.subset_px;
+    before += per_point * s.ends.share(s.points[i], side_px);
+    after += per_point * ends.share(s.points[i] + guesses[i].displacement(), side_px);
+  }
+  warnOfImages(before, after, s.sharpness, sharpnessOf(image), field.warnings);
   field.points.resize(s.points.size());
   s.matchAll(deformed, judge, guesses, field.points);
   s.recover(deformed, judge, field.points);

@@ -20,6 +20,8 @@ namespace {
 constexpr double kCell_px = 4.0;
 /// Passes of matching: the first from the coarse surface, the last on the exact nodes.
 constexpr int kPasses = 2;
+/// Passes of matching what the surface's own shape has been taken out of.
+constexpr int kWarpPasses = 2;
 /// Places tried for texture that occurs again, each way, and the correlation that counts.
 constexpr int kRepeatPlaces = 3;
 constexpr double kRepeats = 0.85;
@@ -144,7 +146,13 @@ Result<RestSurface> surfaceOn(const std::vector<CameraView>& views,
     matchNodes(grid, heights, matcher, options, vertices);
     heights.refine(vertices, pixel_m);
   }
-  SurfaceWarp(views, images, options, grid, heights).refine(vertices);
+  // A subset does not see a height that scatters within it, so what it is laid over must not.
+  const double reach_m = 0.5 * options.correlate.match.subset_px * pixel_m;
+  for (int pass = 0; pass < kWarpPasses; ++pass) {
+    const SheetHeights smooth = heights.smoothed(reach_m);
+    SurfaceWarp(views, images, options, grid, smooth).refine(vertices);
+    heights.refine(vertices, pixel_m);
+  }
   settleOnNodes(views, grid, heights, vertices);
   auto surface = meshOnGrid(grid, heights, std::move(vertices));
   if (!surface) return surface;

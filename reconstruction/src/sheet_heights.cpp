@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "sheet_heights.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -12,6 +13,7 @@ namespace {
 /// their spread, in its sigma and in pixels.
 constexpr double kSpreads = 5.0, kSigmas = 5.0, kFixed_px = 0.15;
 constexpr std::size_t kLeastNeighbours = 3;
+constexpr int kLeastForQuadric = 12;
 
 double medianOf(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -24,7 +26,8 @@ double medianOf(std::vector<double> values) {
 SheetHeights::SheetHeights(const SheetGrid& grid, const HeightField& coarse)
     : grid_(grid),
       heights_(static_cast<std::size_t>(grid.columns) * static_cast<std::size_t>(grid.rows)),
-      known_(heights_.size()) {
+      known_(heights_.size()),
+      matched_(heights_.size()) {
   for (int node = 0; node < static_cast<int>(heights_.size()); ++node) {
     const auto tangent = coarse.at(grid.place(node));
     if (!tangent) continue;
@@ -106,7 +109,45 @@ void SheetHeights::refine(std::vector<RestVertex>& vertices, double pixel_m) {
     known_[node] = 1;
   }
   dropOutliers(vertices, pixel_m);
+  matched_ = known_;
   fill();
+}
+
+double SheetHeights::quadricAt(int node, const Eigen::Vector2i& reach) const {
+  using Vec6 = Eigen::Matrix<double, 6, 1>;
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+  Vec6 right = Vec6::Zero();
+  const int column = node % grid_.columns, row = node / grid_.columns;
+  int count = 0;
+  for (int j = -reach.y(); j <= reach.y(); ++j) {
+    for (int i = -reach.x(); i <= reach.x(); ++i) {
+      const int c = column + i, r = row + j;
+      if (c < 0 || r < 0 || c >= grid_.columns || r >= grid_.rows) continue;
+      const int other = r * grid_.columns + c;
+      if (!known(other)) continue;
+      const double x = static_cast<double>(i) / (reach.x() + 1);
+      const double y = static_cast<double>(j) / (reach.y() + 1);
+      const double weight = (1.0 - x * x) * (1.0 - y * y);
+      const Vec6 terms{1.0, x, y, x * x, x * y, y * y};
+      normal.noalias() += weight * terms * terms.transpose();
+      right += weight * heights_[other] * terms;
+      ++count;
+    }
+  }
+  if (count < kLeastForQuadric) return heights_[node];
+  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(normal);
+  const double height = factors.solve(right)[0];
+  return factors.info() == Eigen::Success && std::isfinite(height) ? height : heights_[node];
+}
+
+SheetHeights SheetHeights::smoothed(double reach_m) const {
+  SheetHeights out = *this;
+  const Eigen::Vector2i reach =
+      (reach_m * grid_.spacing_m.cwiseInverse()).cast<int>().cwiseMax(Eigen::Vector2i::Ones());
+  for (int node = 0; node < static_cast<int>(heights_.size()); ++node) {
+    if (known(node)) out.heights_[node] = quadricAt(node, reach);
+  }
+  return out;
 }
 
 void SheetHeights::dropOutliers(std::vector<RestVertex>& vertices, double pixel_m) {

@@ -18,7 +18,13 @@ class SheetHeights {
   /// become outliers, nodes without a match are filled from those around them.
   void refine(std::vector<RestVertex>& vertices, double pixel_m);
 
+  /// With each height that of a quadric through those around it, up to `reach_m` away, which nearer
+  /// ones pull at more.
+  SheetHeights smoothed(double reach_m) const;
+
   bool known(int node) const { return known_[static_cast<std::size_t>(node)] != 0; }
+  /// Whether a match, and not what lies around it, says how high a node is.
+  bool matched(int node) const { return matched_[static_cast<std::size_t>(node)] != 0; }
   /// The surface at a node, and at any place near one. Precondition: the (nearest) node is known.
   SurfaceElement element(int node) const { return elementAt(grid_.place(node)); }
   SurfaceElement elementAt(const Vec2& place_m) const;
@@ -32,10 +38,11 @@ class SheetHeights {
   Vec2 slope(int node) const;
   void dropOutliers(std::vector<RestVertex>& vertices, double pixel_m);
   void fill();
+  double quadricAt(int node, const Eigen::Vector2i& reach) const;
 
   const SheetGrid& grid_;
   std::vector<double> heights_;
-  std::vector<std::uint8_t> known_;
+  std::vector<std::uint8_t> known_, matched_;
 };
 
 }  // namespace tenter

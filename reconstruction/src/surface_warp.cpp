@@ -97,11 +97,16 @@ GrayImage SurfaceWarp::seenFrom(int f, int k) const {
   return image;
 }
 
-bool SurfaceWarp::subsetOnGrid(const RestVertex& vertex) const {
+bool SurfaceWarp::subsetOnKnown(const RestVertex& vertex) const {
   const VertexSighting& own = vertex.sightings.front();
   const double r = options_.correlate.match.subset_px / 2;
-  for (const Vec2& corner : {Vec2(-r, -r), Vec2(r, -r), Vec2(r, r), Vec2(-r, r)}) {
-    if (!surfaceAt(views_[own.sighting.view], own.centre + corner)) return false;
+  for (int i = -1; i <= 1; ++i) {
+    for (int j = -1; j <= 1; ++j) {
+      const auto at = surfaceAt(views_[own.sighting.view], own.centre + r * Vec2(i, j));
+      if (!at) return false;
+      const Vec3 place = sheet_from_space_ * *at;
+      if (!heights_.matched(heights_.nodeNear(place.head<2>()))) return false;
+    }
   }
   return true;
 }
@@ -166,7 +171,7 @@ void SurfaceWarp::refine(std::vector<RestVertex>& vertices) const {
   // Which vertices each pair of front view and other view has.
   std::map<std::pair<int, int>, std::vector<int>> tasks;
   for (int i = 0; i < static_cast<int>(vertices.size()); ++i) {
-    if (vertices[i].state != PointState::kValid || !subsetOnGrid(vertices[i])) continue;
+    if (vertices[i].state != PointState::kValid || !subsetOnKnown(vertices[i])) continue;
     const auto& sightings = vertices[i].sightings;
     for (std::size_t s = 1; s < sightings.size(); ++s) {
       tasks[{sightings.front().sighting.view, sightings[s].sighting.view}].push_back(i);

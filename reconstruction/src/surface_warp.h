@@ -40,7 +40,7 @@ class SurfaceWarp {
   bool onGrid(const Vec2& place) const;
   /// Image k as view f would see it.
   GrayImage seenFrom(int f, int k) const;
-  bool subsetOnGrid(const RestVertex& vertex) const;
+  bool subsetOnKnown(const RestVertex& vertex) const;
 
   const std::vector<CameraView>& views_;
   const std::vector<GrayImage>& images_;

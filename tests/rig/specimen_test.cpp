@@ -35,8 +35,8 @@ TEST(SpecimenTest, ASessionsForcesAreTheSpecimensAndThePulleys) {
   const std::string session = running.path("session");
   // A check of the mapping rubs the cords to and fro first: by travel alone nobody knows then which
   // way their friction points.
-  ASSERT_EQ(running.tenterRig({"run", running.write("p.toml", kStretch), "--skip-mapping-check",
-                               "-o", session}),
+  ASSERT_EQ(running.tenterRig(
+                {"run", running.write("p.toml", kStretch), "--skip-mapping-check", "-o", session}),
             0)
       << test_support::slurp(running.path("out"));
   ASSERT_TRUE(verifySession(session)->ok());

@@ -31,6 +31,7 @@ void TruthLog::forget() {
 
 TruthLog::Look TruthLog::look() const {
   Look now;
+  now.begin_ns = monotonic_ns();
   for (int i = 0; i < ServedRig::kAxes; ++i) {
     const auto at = static_cast<std::size_t>(i);
     now.position_m[at] = rig_.usb().state(i).position_units * ServedRig::kMetresPerMicrostep;
@@ -65,7 +66,7 @@ std::optional<std::pair<double, double>> TruthLog::tensions_N(int cord, std::int
     const double tension_N = look->tension_N[static_cast<std::size_t>(cord)];
     lowest_N = std::min(lowest_N, tension_N);
     highest_N = std::max(highest_N, tension_N);
-    if (last_ns > to_ns) return std::pair(lowest_N, highest_N);
+    if (look->begin_ns > to_ns) return std::pair(lowest_N, highest_N);
   }
   return std::nullopt;
 }

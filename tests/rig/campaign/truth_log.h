@@ -36,7 +36,8 @@ class TruthLog {
 
  private:
   struct Look {
-    std::int64_t time_ns = 0;
+    /// The thread may be interrupted while it looks: what it saw was so some time in between.
+    std::int64_t begin_ns = 0, time_ns = 0;
     std::array<double, ServedRig::kAxes> position_m{}, tension_N{};
   };
   void watch();
