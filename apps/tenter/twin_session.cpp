@@ -162,7 +162,8 @@ Result<int> captureSession(const SessionCapture& capture, Console& console) {
   if (!capture.truth.empty()) {
     if (auto free = checkOutputFolder(capture.truth, rigTruthFolder()); !free) return free.error();
   }
-  const auto protocol = protocolText(capture.mount.protocol);
+  auto protocol = Result<std::string>(capture.protocol_text);
+  if (protocol->empty()) protocol = protocolText(capture.mount.protocol);
   if (!protocol) return protocol.error();
   if (auto ready = preloadDevices(); !ready) return ready.error();
   const auto state = StateFolder::make();

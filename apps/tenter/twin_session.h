@@ -11,6 +11,7 @@ namespace tenter::app {
 
 struct SessionCapture {
   MountOptions mount;
+  std::string protocol_text;  ///< Empty: as shipped.
   bool tcp = true;
   CameraSourceOptions cameras;  ///< Their number is 0: no images.
   std::string output;           ///< Folder of the session.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 
+#include "demo_images.h"
 #include "interrupt.h"
 #include "output_guard.h"
 #include "report.h"
@@ -30,8 +31,12 @@ constexpr const char* kMarker = "demo.json";
 
 struct Options {
   std::string output = "tenter-demo", data, fabric = "knit-12";
-  int frames = 18, nodes = 31, threads = 2;
+  int frames = 0, nodes = 31, threads = 2;
   std::uint64_t seed = 7;
+  bool full = false, no_images = false;
+
+  /// A few frames and smaller images, unless all is asked for.
+  int frameCount() const { return frames > 0 ? frames : full || no_images ? 18 : 8; }
 };
 
 void declare(CLI::App& command, Options& o) {
@@ -40,9 +45,13 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--data", o.data,
                      "Folder with nylon-offaxis/ (default: $TENTER_DATA, ../shared/data)");
   command.add_option("--fabric", o.fabric, "Virtual fabric")->capture_default_str();
-  command.add_option("--frames", o.frames, "Frames of each virtual capture")
-      ->check(CLI::Range(4, 200))
-      ->capture_default_str();
+  command
+      .add_option("--frames", o.frames,
+                  "Frames of each virtual capture; default: 8, with --full or --no-images 18")
+      ->check(CLI::Range(4, 200));
+  command.add_flag("--full", o.full, "More frames, and images of full size: about an hour");
+  command.add_flag("--no-images", o.no_images,
+                   "Measurements as cameras would make them, without rendering and reconstruction");
   command.add_option("--nodes", o.nodes, "Nodes a side of the virtual specimen")
       ->check(CLI::Range(25, 100))
       ->capture_default_str();
@@ -115,12 +124,18 @@ Result<std::vector<Measurement>> virtualStrips(const Options& o) {
   return all;
 }
 
-/// Captures every protocol of a fit and the two held out, two at a time.
-Result<void> captureAll(const Options& o, Course& course) {
+/// The protocols of a fit and the two held out.
+std::vector<const ProtocolInfo*> demoProtocols() {
   std::vector<const ProtocolInfo*> chosen;
   for (const ProtocolInfo& p : protocols()) {
     if (p.id != "bend-bias") chosen.push_back(&p);
   }
+  return chosen;
+}
+
+/// Captures protocols without images, two at a time.
+Result<void> captureAll(const Options& o, const std::vector<const ProtocolInfo*>& chosen,
+                        Course& course) {
   std::vector<std::optional<Result<CaptureResult>>> results(chosen.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
@@ -130,7 +145,7 @@ Result<void> captureAll(const Options& o, Course& course) {
       capture.protocol = chosen[i]->id;
       capture.seed = o.seed;
       capture.nodes = o.nodes;
-      capture.frames = o.frames;
+      capture.frames = o.frameCount();
       capture.cancelled = interrupted;
       results[i] = captureMeasurement(capture);
     }
@@ -146,6 +161,56 @@ Result<void> captureAll(const Options& o, Course& course) {
     m.name = chosen[i]->id;
     (chosen[i]->for_fitting ? course.fitted : course.held_out).push_back(std::move(m));
   }
+  return {};
+}
+
+/// The protocols of the fit from images; what is held out is measured without.
+Result<void> seeAll(const Options& o, Course& course, Report& report, Console& console) {
+  DemoCameras demo;
+  demo.fabric = o.fabric;
+  demo.seed = o.seed;
+  demo.nodes = o.nodes;
+  demo.frames = o.frameCount();
+  demo.threads = o.threads;
+  demo.folder = fs::path(o.output) / "images";
+  if (!o.full) {
+    demo.width_px = 968;
+    demo.boards = 12;
+    demo.subset_px = 21;
+  }
+  std::vector<const ProtocolInfo*> unseen;
+  std::vector<std::string> lines;
+  for (const ProtocolInfo* protocol : demoProtocols()) {
+    if (!protocol->for_fitting) {
+      unseen.push_back(protocol);
+      continue;
+    }
+    console.say("seeing " + std::string(protocol->id) + " through four virtual cameras ...");
+    auto seen = measureByImages(demo, *protocol, console);
+    if (!seen) return seen.error();
+    console.say("  " + seen->summary);
+    lines.push_back(seen->summary);
+    course.fitted.push_back(std::move(seen->measurement));
+  }
+  if (auto done = captureAll(o, unseen, course); !done) return done;
+  console.say("capturing stretch-weft through tenterd, USB, Modbus and GigE Vision ...");
+  auto live = measureThroughDaemon(demo, console);
+  if (live) {
+    console.say("  " + live->summary);
+    lines.push_back(live->summary + "; its first frame is the reference, so that it is held out");
+    course.held_out.push_back(std::move(live->measurement));
+  } else if (interrupted()) {
+    return live.error();
+  } else {
+    console.warn("not captured through tenterd: " + live.error().message());
+    lines.push_back("stretch-weft was not captured through tenterd: " + live.error().message());
+  }
+  report.heading(o.fabric + " as four cameras saw it");
+  report.paragraph(
+      "Cameras were calibrated from rendered images of a board, sessions rendered and "
+      "reconstructed; "
+      "how good each is says images/PROTOCOL/quality.html beside this page.");
+  report.list(lines);
   return {};
 }
 
@@ -257,13 +322,12 @@ Result<int> run(const Options& o, Console& console) {
   rig.options.cancelled = interrupted;
   rig.options.law_uncertainty = false;
   console.say("capturing seven protocols of " + o.fabric + " on the virtual rig ...");
-  if (auto done = captureAll(o, rig); !done) {
-    return interrupted() ? stopped(o.output) : done.error();
-  }
+  const auto captured =
+      o.no_images ? captureAll(o, demoProtocols(), rig) : seeAll(o, rig, report, console);
+  if (!captured) return interrupted() ? stopped(o.output) : captured.error();
   for (const auto* group : {&rig.fitted, &rig.held_out}) {
     for (const Measurement& m : *group) {
-      if (auto done = writeMeasurement(fs::path(o.output) / (o.fabric + "-" + m.protocol), m);
-          !done) {
+      if (auto done = writeMeasurement(fs::path(o.output) / (o.fabric + "-" + m.name), m); !done) {
         return done.error();
       }
     }

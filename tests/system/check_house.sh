@@ -7,12 +7,19 @@ set -euo pipefail
 cd "${1:-$(dirname "${BASH_SOURCE[0]}")/../..}"
 
 max_lines=600
-licence='SPDX-License-Identifier: (GPL-3\.0-or-later|CC0-1\.0)$'
+licence='SPDX-License-Identifier: (GPL-3[.]0-or-later|CC0-1[.]0)$'
 # In two halves each, so that this file does not contain what it looks for.
 machine_path='(^|[^[:alnum:]_.])(/wo''rk/|/tm''p/w(/|[^[:alnum:]]|$)|/ro''ot/|/ho''me/[a-z])'
 
 tracked() {
   git -c safe.directory='*' ls-files --cached -- "$@"
+}
+
+# Those that are still there.
+present() {
+  tracked "$@" | while IFS= read -r file; do
+    [[ -f "$file" ]] && printf '%s\n' "$file"
+  done
 }
 
 if ! tracked >/dev/null 2>&1; then
@@ -27,15 +34,17 @@ breach() {
 }
 
 while IFS= read -r file; do
-  [[ -f "$file" ]] || continue
-  head -n 3 "$file" | tr -d '\r' | sed 's/ *-->$//' | grep -qE "$licence" || breach "$file: no SPDX line among the first three"
-done < <(tracked '*.cpp' '*.h' '*.cmake' '*CMakeLists.txt' '*.sh' '*.py' '*.toml' '.ci/run' '.clang-*')
+  breach "$file: no SPDX line among the first three"
+done < <(present '*.cpp' '*.h' '*.cmake' '*CMakeLists.txt' '*.sh' '*.py' '*.toml' '.ci/run' '.clang-*' |
+  xargs -d '\n' awk -v licence="$licence" '
+    FNR == 1 { if (name != "" && !licensed) print name; name = FILENAME; licensed = 0 }
+    FNR <= 3 { sub(/\r$/, ""); sub(/ *-->$/, ""); if ($0 ~ licence) licensed = 1 }
+    END { if (name != "" && !licensed) print name }')
 
-while IFS= read -r file; do
-  [[ -f "$file" ]] || continue
-  lines=$(wc -l <"$file")
-  [[ $lines -le $max_lines ]] || breach "$file: $lines lines, $max_lines are allowed"
-done < <(tracked '*.cpp' '*.h' '*.cmake' '*CMakeLists.txt' '*.sh' '*.py' '*.toml' '*.md')
+while read -r lines file; do
+  breach "$file: $lines lines, $max_lines are allowed"
+done < <(present '*.cpp' '*.h' '*.cmake' '*CMakeLists.txt' '*.sh' '*.py' '*.toml' '*.md' | xargs -d '\n' wc -l |
+  awk -v most="$max_lines" '$1 > most && $2 != "total"')
 
 while IFS= read -r document; do
   [[ -f "$document" ]] || continue
