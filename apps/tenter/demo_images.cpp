@@ -174,7 +174,7 @@ name = "stretch-weft"
 description = "two bar clips pull along the weft, once"
 axes = ["axis-1", "axis-2", "axis-3", "axis-4"]
 speed_m_per_s = 0.0009
-capture_interval_s = 3.0
+capture_interval_s = 4.0
 [[phase]]
 name = "pretension"
 [[phase.step]]
@@ -201,7 +201,7 @@ limit_m = 0.05
   capture.mount.seed = demo.seed;
   capture.cameras.cameras = kCameras;
   capture.cameras.images = CameraSourceOptions::kScene;
-  capture.cameras.width_px = demo.width_px;
+  capture.cameras.width_px = demo.width_px / 2;  // drawn while devices answer
   capture.protocol_text = kOneCycle;
   capture.output = (folder / "session").string();
   Console quiet = console;
@@ -209,8 +209,8 @@ limit_m = 0.05
   const auto ended = captureSession(capture, quiet);
   if (!ended) return ended.error();
   if (*ended != kDone) {
-    return Error{ErrorKind::kHardware, "tenterd", "", "the run ended with " + std::to_string(*ended),
-                 quiet.answer.dump()};
+    return Error{ErrorKind::kHardware, "tenterd", "",
+                 "the run ended with " + std::to_string(*ended), quiet.answer.dump()};
   }
   const auto verified = verifySession(folder / "session");
   if (!verified) return verified.error();

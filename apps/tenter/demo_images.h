@@ -32,10 +32,9 @@ struct SeenTest {
 Result<SeenTest> measureByImages(const DemoCameras& demo, const ProtocolInfo& protocol,
                                  Console& console);
 
-/// One cycle of stretch-weft through tenterd: actuators on USB, cells on Modbus TCP, cameras by GigE
-/// Vision; then reconstructed. There is no picture of the sample before it was hung, so its first
-/// frame is the reference. Error, of kind kHardware, also where the program was built without
-/// devices.
+/// One cycle of stretch-weft through tenterd: actuators on USB, cells on Modbus TCP, cameras by
+/// GigE Vision; then reconstructed. Error, of kind kHardware, also where the program was built
+/// without devices.
 Result<SeenTest> measureThroughDaemon(const DemoCameras& demo, Console& console);
 
 }  // namespace tenter::app

@@ -51,15 +51,21 @@ Result<CameraImage> imageOf(const Json& row, const std::vector<FileDescriptor>& 
 }
 
 Result<int> snap(const Options& o, Console& console) {
-  if (auto free = checkNewFolder(o.output); !free) return free.error();
-  const auto client = RigClient::connect(o.socket->as<std::string>());
+  return takeSnap(o.socket->as<std::string>(), o.output, console);
+}
+
+}  // namespace
+
+Result<int> takeSnap(const std::string& socket, const std::string& output, Console& console) {
+  if (auto free = checkNewFolder(output); !free) return free.error();
+  const auto client = RigClient::connect(socket);
   if (!client) return client.error();
   const auto answer = (*client)->call("frames");
   if (!answer) return answer.error();
   const std::vector<FileDescriptor> files = (*client)->takeFiles();
   std::error_code failed;
-  fs::create_directories(o.output, failed);
-  if (failed) return badInput(o.output, "", failed.message());
+  fs::create_directories(output, failed);
+  if (failed) return badInput(output, "", failed.message());
   console.answer = *answer;
   bool complete = true;
   for (Json& row : console.answer["frames"]) {
@@ -73,7 +79,7 @@ Result<int> snap(const Options& o, Console& console) {
     if (!image) return image.error();
     const auto png = encodePng(*image);
     if (!png) return png.error();
-    const fs::path file = fs::path(o.output) / (name + ".png");
+    const fs::path file = fs::path(output) / (name + ".png");
     if (auto done = writeFileAtomically(file, *png); !done) return done.error();
     row.erase("descriptor");
     row["file"] = file.string();
@@ -82,8 +88,6 @@ Result<int> snap(const Options& o, Console& console) {
   if (complete) return kDone;
   return Error{ErrorKind::kHardware, "", "cameras", "not every camera gave an image", ""};
 }
-
-}  // namespace
 
 Verb rigSnap() {
   return {"snap", "What the cameras see now, as PNG",

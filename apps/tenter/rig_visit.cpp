@@ -35,6 +35,18 @@ std::string forces(const Json& now) {
   return text + " N";
 }
 
+/// Reason and faults of a status, for an error.
+std::string amiss(const Json& status) {
+  std::string text = status.value("reason", "");
+  for (const char* kind : {"axes", "cells", "cameras"}) {
+    for (const Json& device : status.value(kind, Json::array())) {
+      const std::string fault = device.value("fault", "");
+      if (!fault.empty()) text += "; " + device.value("name", "") + ": " + fault;
+    }
+  }
+  return text.empty() ? text : ": " + text;
+}
+
 bool sessionClosed(const Json& status) {
   return status.value("session", Json::object()).value("closed", false);
 }
@@ -86,7 +98,8 @@ Result<void> RigVisit::enable() {
     if (!now) return now.error();
   }
   if (now->value("state", "") != "off") return {};
-  return Error{ErrorKind::kHardware, "", "", "the rig does not come up", "see `tenter rig status`"};
+  return Error{ErrorKind::kHardware, "", "", "the rig does not come up" + amiss(*now),
+               "see `tenter rig status`"};
 }
 
 Result<void> RigVisit::homeIfLost() {

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <thread>
@@ -12,8 +13,11 @@
 #include "interrupt.h"
 #include "output_guard.h"
 #include "protocol_files.h"
+#include "rig_client.h"
+#include "rig_snap.h"
 #include "rig_visit.h"
 #include "tenter/core/files.h"
+#include "tenter/reconstruction/image_session.h"
 #include "tenter/session/mounting.h"
 #include "tenter/twin/fabrics.h"
 #include "tenter/twin/served_rig.h"
@@ -26,6 +30,7 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
 constexpr auto kPoll = 50ms;
+constexpr auto kBetweenLooks = 500ms;
 constexpr auto kStart = 20s;     // until the daemon listens
 constexpr auto kFarewell = 40s;  // longer than the daemon takes to unload
 constexpr std::size_t kMaxFile_bytes = std::size_t{256} << 20;
@@ -127,8 +132,13 @@ Result<void> keepTruth(const StateFolder& state, const std::string& folder) {
   });
 }
 
-/// What the cameras look at, and their calibration, where a session has them.
+/// What the cameras look at, their calibration, and the sample at rest, where a session has them.
 Result<void> keepScene(const StateFolder& state, const fs::path& session) {
+  std::error_code copied;
+  if (fs::exists(state / kRestFolder)) {
+    fs::copy(state / kRestFolder, session / kRestFolder, fs::copy_options::recursive, copied);
+    if (copied) return badInput((session / kRestFolder).string(), "", copied.message());
+  }
   for (const auto& [from, to] : {std::pair("mounting.json", kMountingFile),
                                  std::pair("calibration.json", kSessionCalibrationFile)}) {
     if (!fs::exists(state / from)) continue;
@@ -140,6 +150,38 @@ Result<void> keepScene(const StateFolder& state, const fs::path& session) {
     if (auto done = writeFileAtomically(session / to, *text); !done) return done;
   }
   return {};
+}
+
+Result<bool> allConnected(const std::string& socket) {
+  const auto client = RigClient::connect(socket);
+  if (!client) return client.error();
+  const auto status = (*client)->call("status");
+  if (!status) return status.error();
+  const nlohmann::json cameras = status->value("cameras", nlohmann::json::array());
+  return std::all_of(cameras.begin(), cameras.end(),
+                     [](const nlohmann::json& camera) { return camera.value("connected", false); });
+}
+
+/// Pictures of the sample before it is hung, once all cameras are there.
+Result<void> lookAtRest(const StateFolder& state, const std::string& socket,
+                        const Console& console) {
+  Console silent = console;
+  silent.quiet = true;
+  const fs::path folder = state / kRestFolder;
+  const auto begin = std::chrono::steady_clock::now();
+  while (true) {
+    const auto ready = allConnected(socket);
+    if (!ready) return ready.error();
+    const bool late = std::chrono::steady_clock::now() - begin > kStart;
+    if (*ready || late) {
+      std::error_code ignored;
+      fs::remove_all(folder, ignored);
+      const auto taken = takeSnap(socket, folder.string(), silent);
+      if (taken) return {};
+      if (late) return taken.error();
+    }
+    std::this_thread::sleep_for(kBetweenLooks);
+  }
 }
 
 Result<int> runProtocol(const SessionCapture& capture, const std::string& protocol,
@@ -183,6 +225,9 @@ Result<int> captureSession(const SessionCapture& capture, Console& console) {
                    "--end-with-parent"},
                   **state / kLog);
     if (auto up = daemon.awaitSocket(socket); !up) return up.error();
+    if (options.scene) {
+      if (auto seen = lookAtRest(**state, socket, console); !seen) return seen.error();
+    }
     ended = runProtocol(capture, *protocol, socket, console);
   }
   if (!ended) return ended;

@@ -197,7 +197,7 @@ Result<void> seeAll(const Options& o, Course& course, Report& report, Console& c
   auto live = measureThroughDaemon(demo, console);
   if (live) {
     console.say("  " + live->summary);
-    lines.push_back(live->summary + "; its first frame is the reference, so that it is held out");
+    lines.push_back(live->summary + " (held out)");
     course.held_out.push_back(std::move(live->measurement));
   } else if (interrupted()) {
     return live.error();

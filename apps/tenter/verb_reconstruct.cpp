@@ -311,7 +311,9 @@ Result<int> runSession(const Options& o, Console& console) {
     std::vector<std::string> unread;
     return std::move(readMoment(*session, *moment, unread).front());
   };
-  return finish(*result, session->views.front(), image, o, console);
+  const auto done = finish(*result, session->views.front(), image, o, console);
+  if (done) discardPartial(options.partial);
+  return done;
 }
 
 Result<int> run(const Options& o, Console& console) {

@@ -41,6 +41,7 @@ struct CaptureCommand {
   int nodes = 0;
   std::string fabric, output, truth, shown;
   ImageOptions images;
+  const CLI::Option* cameras = nullptr;  ///< Whether they were asked for.
 };
 
 void declareCapture(CLI::App& command, CaptureCommand& o) {
@@ -59,7 +60,8 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
                    "A session through virtual devices and tenterd, in real time");
   command.add_option("--images", o.shown,
                      "What cameras show to the daemon: scene (the sample as it hangs), "
-                     "test-pattern, a picture, or a folder of pictures; without, it has none");
+                     "test-pattern, a picture, or a folder of pictures; without, and without "
+                     "--cameras, it has none");
   command.add_option("--modbus", o.modbus, "How a session's load cells are reached")
       ->check(CLI::IsMember({"tcp", "rtu"}))
       ->capture_default_str();
@@ -90,6 +92,7 @@ void declareCapture(CLI::App& command, CaptureCommand& o) {
       ->check(CLI::IsMember({"uniform", "alternating"}))
       ->capture_default_str();
   declareImages(command, o.images);
+  o.cameras = command.get_option("--cameras");
 }
 
 #ifdef TENTER_HARDWARE
@@ -99,11 +102,12 @@ Result<int> captureThroughDaemon(const CaptureCommand& command, Console& console
                    command.capture.specimen, MountOptions{}.nodes};
   if (command.nodes != 0) session.mount.nodes = command.nodes;
   session.tcp = command.modbus == "tcp";
-  if (!command.shown.empty()) {
-    const bool drawn = command.shown == CameraSourceOptions::kScene ||
-                       command.shown == CameraSourceOptions::kTestPattern;
-    session.cameras = {command.images.cameras, command.shown, drawn ? command.images.width_px : 0,
-                       0};
+  std::string shown = command.shown;
+  if (shown.empty() && command.cameras->count() > 0) shown = CameraSourceOptions::kScene;
+  if (!shown.empty()) {
+    const bool drawn =
+        shown == CameraSourceOptions::kScene || shown == CameraSourceOptions::kTestPattern;
+    session.cameras = {command.images.cameras, shown, drawn ? command.images.width_px : 0, 0};
   }
   session.output = command.output;
   session.truth = command.truth;

@@ -58,10 +58,16 @@ Result<void> ClothTracker::State::prepare(const std::vector<GrayImage>& images) 
     if (vertex.state != PointState::kValid) continue;
     for (std::size_t k = 0; k < vertex.sightings.size(); ++k) {
       const Sighting& sighting = vertex.sightings[k].sighting;
-      tracked[sighting.view].vertices.push_back(i);
-      tracked[sighting.view].places.push_back(k);
       const auto projected = views[sighting.view].project(vertex.point.position_m);
       rest_residuals[i].push_back(projected ? Vec2(sighting.pixel - *projected) : Vec2::Zero());
+      // A subset that was moved inwards may see a vertex that lies just beyond the image.
+      const CameraModel& camera = views[sighting.view].model;
+      const Vec2 corner(camera.widthPx() - 1, camera.heightPx() - 1);
+      if ((sighting.pixel.array() < 0.0).any() || (sighting.pixel.array() > corner.array()).any()) {
+        continue;
+      }
+      tracked[sighting.view].vertices.push_back(i);
+      tracked[sighting.view].places.push_back(k);
     }
   }
   for (std::size_t v = 0; v < views.size(); ++v) {

@@ -90,11 +90,29 @@ void attachSamples(const std::vector<TimedSample>& samples, ImageSession& sessio
   }
 }
 
-Result<void> findReference(ImageSession& session) {
-  const std::string journal = (session.folder / "journal.jsonl").string();
-  if (session.moments.empty()) {
-    return badInput(journal, "", "the session has no images", "was it recorded without cameras?");
+/// Pictures from before the session, of the sample at rest; they come before its frames.
+Result<void> addRest(ImageSession& session) {
+  const fs::path folder = session.folder / kRestFolder;
+  std::error_code failed;
+  if (session.mounting.rest_frame || !fs::is_directory(folder, failed)) return {};
+  SessionMoment rest;
+  rest.frame = -1;
+  rest.files.resize(session.views.size());
+  for (std::size_t v = 0; v < session.views.size(); ++v) {
+    const std::string name = session.views[v].name + ".png";
+    if (!fs::exists(folder / name, failed)) continue;
+    const auto bytes = readFile(folder / name);
+    if (!bytes) return bytes.error();
+    rest.files[v] = FrameFile{std::string(kRestFolder) + "/" + name, sha256(*bytes), bytes->size()};
+    session.identity += "\n" + rest.files[v]->name + "=" + rest.files[v]->sha256;
   }
+  session.moments.insert(session.moments.begin(), std::move(rest));
+  session.at_rest = true;
+  return {};
+}
+
+Result<void> findReference(ImageSession& session) {
+  if (session.at_rest) return {};
   if (!session.mounting.rest_frame) {
     session.warnings.push_back(
         "the session has no frame at rest: (u, v) are those of the first frame, as stretched as it "
@@ -110,6 +128,7 @@ Result<void> findReference(ImageSession& session) {
         "frame " + std::to_string(*session.mounting.rest_frame) + " is not in the session");
   }
   session.reference = static_cast<std::size_t>(rest - session.moments.begin());
+  session.at_rest = true;
   return {};
 }
 
@@ -143,11 +162,16 @@ Result<ImageSession> openImageSession(const fs::path& folder) {
   std::vector<TimedSample> samples;
   if (auto done = readJournal(**reader, session, samples); !done) return done.error();
   attachSamples(samples, session);
-  if (auto found = findReference(session); !found) return found.error();
   session.identity = session.header.id + "\n" + session.header.start_utc;
   for (const auto& [key, id] : session.header.calibration_ids) {
     session.identity += "\n" + key + "=" + id;
   }
+  if (session.moments.empty()) {
+    return badInput((folder / "journal.jsonl").string(), "", "the session has no images",
+                    "was it recorded without cameras?");
+  }
+  if (auto added = addRest(session); !added) return added.error();
+  if (auto found = findReference(session); !found) return found.error();
   return session;
 }
 

@@ -96,25 +96,57 @@ PointState MatchJudge::stateOf(const CorrelatedPoint& point) const {
   return point.sigma_px() <= options_.max_sigma_px ? PointState::kValid : PointState::kUncertain;
 }
 
+namespace {
+
+/// Sums over means of 2 x 2 pixels, so that noise does not pass for sharpness.
+class Sharpness {
+ public:
+  explicit Sharpness(const GrayImage& image) : image_(image) {}
+
+  void add(int x, int y) {
+    if (x < 0 || y < 0 || x + 3 >= image_.width || y + 3 >= image_.height) return;
+    const double value = block(x, y);
+    const double dx = 0.5 * (block(x + 2, y) - value), dy = 0.5 * (block(x, y + 2) - value);
+    slopes_ += dx * dx + dy * dy;
+    sum_ += value;
+    squares_ += value * value;
+    count_ += 1.0;
+  }
+  double value() const {
+    const double variance = squares_ / count_ - sum_ * sum_ / (count_ * count_);
+    return variance > 0.0 ? slopes_ / count_ / variance : 0.0;
+  }
+
+ private:
+  double block(int x, int y) const {
+    return 0.25 * (static_cast<double>(image_.at(x, y)) + image_.at(x + 1, y) +
+                   image_.at(x, y + 1) + image_.at(x + 1, y + 1));
+  }
+
+  const GrayImage& image_;
+  double slopes_ = 0.0, sum_ = 0.0, squares_ = 0.0, count_ = 0.0;
+};
+
+}  // namespace
+
 double sharpnessOf(const GrayImage& image) {
-  // Means of 2 x 2 pixels, so that noise does not pass for sharpness.
-  const auto block = [&image](int x, int y) {
-    return 0.25 * (static_cast<double>(image.at(x, y)) + image.at(x + 1, y) + image.at(x, y + 1) +
-                   image.at(x + 1, y + 1));
-  };
-  double slopes = 0.0, sum = 0.0, squares = 0.0, count = 0.0;
+  Sharpness sharpness(image);
   for (int y = 0; y + 3 < image.height; y += 2) {
-    for (int x = 0; x + 3 < image.width; x += 2) {
-      const double value = block(x, y);
-      const double dx = 0.5 * (block(x + 2, y) - value), dy = 0.5 * (block(x, y + 2) - value);
-      slopes += dx * dx + dy * dy;
-      sum += value;
-      squares += value * value;
-      count += 1.0;
+    for (int x = 0; x + 3 < image.width; x += 2) sharpness.add(x, y);
+  }
+  return sharpness.value();
+}
+
+double sharpnessAround(const GrayImage& image, const std::vector<Vec2>& places) {
+  constexpr int kReach_px = 4;
+  Sharpness sharpness(image);
+  for (const Vec2& place : places) {
+    const int x = static_cast<int>(place.x()), y = static_cast<int>(place.y());
+    for (int j = -kReach_px; j <= kReach_px; j += 2) {
+      for (int i = -kReach_px; i <= kReach_px; i += 2) sharpness.add(x + i, y + j);
     }
   }
-  const double variance = squares / count - sum * sum / (count * count);
-  return variance > 0.0 ? slopes / count / variance : 0.0;
+  return sharpness.value();
 }
 
 bool agreesWithNeighbours(const CorrelatedPoint& point,

@@ -44,6 +44,8 @@ class MatchJudge {
 
 /// Mean square slope over variance [1/px^2]: falls when an image is defocused.
 double sharpnessOf(const GrayImage& image);
+/// The same, of what lies around some places. Precondition: they lie near the image.
+double sharpnessAround(const GrayImage& image, const std::vector<Vec2>& places);
 
 /// Whether a match agrees with its matched neighbours, each of which predicts the motion there.
 /// False without two of them.

@@ -42,7 +42,7 @@ struct PointTracker::State {
         reference(image),
         matcher(reference, options.match),
         ends(image),
-        sharpness(sharpnessOf(image)),
+        sharpness(sharpnessAround(image, tracked)),
         points(std::move(tracked)),
         centres(subsets.empty() ? points : std::move(subsets)),
         neighbours(neighbourLists(points, kNeighbours)),
@@ -182,15 +182,17 @@ Result<CorrelationField> PointTracker::track(const GrayImage& image) {
   const MatchJudge judge(s.ends, ends, s.options);
   cv::Mat next = eightBits(image);
   const std::vector<SubsetWarp> guesses = s.predict(next);
-  // What lies behind the cloth may be as dark as it likes.
+  // What lies behind the cloth may be as dark as it likes, and clips as sharp.
+  std::vector<Vec2> moved;
   double before = 0.0, after = 0.0;
   const double per_point = 1.0 / static_cast<double>(s.points.size());
   for (std::size_t i = 0; i < s.points.size(); ++i) {
     const int side_px = s.options.match.subset_px;
     before += per_point * s.ends.share(s.points[i], side_px);
-    after += per_point * ends.share(s.points[i] + guesses[i].displacement(), side_px);
+    moved.emplace_back(s.points[i] + guesses[i].displacement());
+    after += per_point * ends.share(moved.back(), side_px);
   }
-  warnOfImages(before, after, s.sharpness, sharpnessOf(image), field.warnings);
+  warnOfImages(before, after, s.sharpness, sharpnessAround(image, moved), field.warnings);
   field.points.resize(s.points.size());
   s.matchAll(deformed, judge, guesses, field.points);
   s.recover(deformed, judge, field.points);

@@ -43,10 +43,9 @@ class SessionRun {
 
   Result<SeriesResult> run() {
     if (auto ready = atRest(); !ready) return ready.error();
-    const bool apart = s_.mounting.rest_frame.has_value();
     for (std::size_t i = 0; i < s_.moments.size(); ++i) {
       // A frame at rest lies before the test and is none of its frames.
-      if (apart && i <= s_.reference) continue;
+      if (s_.at_rest && i <= s_.reference) continue;
       if (!going()) {
         result_.stopped = true;
         break;
@@ -105,6 +104,11 @@ class SessionRun {
     if (!rest) {
       Error error = rest.error().in(s_.folder.string());
       error.place = name;
+      if (!s_.at_rest) {
+        error.advice = "pictures of the sample as it lies flat before it is hung are missing: " +
+                       std::string(kRestFolder) + "/CAMERA.png in the session, or rest_frame in " +
+                       kMountingFile;
+      }
       return error;
     }
     result_.rest = std::move(*rest);
@@ -214,5 +218,7 @@ Result<SeriesResult> reconstructSession(const ImageSession& session,
                                         const SessionReconstruction& options) {
   return SessionRun(session, options).run();
 }
+
+void discardPartial(const std::filesystem::path& folder) { PartialStore(folder, "").clear(); }
 
 }  // namespace tenter

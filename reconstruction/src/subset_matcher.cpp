@@ -20,6 +20,9 @@ constexpr double kLeastPivot = 1e-6;
 constexpr double kLeastFreedom = 20.0;
 /// What interpolation may shift a match by though there is no noise at all [px RMS].
 constexpr double kInterpolationError_px = 0.0015;
+/// Of a point off the centre of its subset: what terms beyond the warp's order may add, of what the
+/// highest adds.
+constexpr double kTruncation = 0.5;
 /// A subset whose area changes by more than this factor has been folded or lost.
 constexpr double kLargestStretch = 4.0;
 template <int kOrder>
@@ -198,7 +201,11 @@ class Matching {
     const Mat2 here = noise / reference_.sharpness() * at.transpose() * factor_.solve(at);
     const Mat2 linear = warp.movedBy(offset).linear();
     const Mat2 random = linear * here * linear.transpose();
-    return random + kInterpolationError_px * kInterpolationError_px * Mat2::Identity();
+    // What the next order would add off the centre is not known; the last one says how much it may.
+    const Vec2 affine = warp.displacement() + (warp.linear() - Mat2::Identity()) * offset;
+    const double truncated_px = kTruncation * (warp.displacementAt(offset) - affine).norm();
+    const double fixed = kInterpolationError_px * kInterpolationError_px;
+    return random + (fixed + truncated_px * truncated_px) * Mat2::Identity();
   }
 
   /// Of both images together, from the misfit that the last step left in the scratch. Only noise as

@@ -25,14 +25,6 @@ double secondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// The flat sample, as it lies before clips are put on.
-SheetShape restShape() {
-  const std::vector<double> ends = {0.0, 0.5 * kSampleSide_m, kSampleSide_m};
-  SheetShape shape{{ends, ends}, {}, {}, {}, {}};
-  shape.nodes = gridSheet(shape.lines).rest.positions;
-  return shape;
-}
-
 /// Tensions by axis: of cords what their cells read, of the others the cells' noise.
 std::vector<TensionReading> readingsOf(const Mounting& mounting, const MeasurementFrame* frame,
                                        const CaptureOptions& options, std::int64_t number) {
@@ -208,7 +200,7 @@ class SessionRun {
     if (auto done = writer_->append(time_ns, sample, Commit::kGroup); !done) return done.error();
 
     const std::vector<ByteImage> pictures =
-        renderer_->render(rests ? restShape() : moment.shape, static_cast<std::uint64_t>(number));
+        renderer_->render(rests ? flatSample() : moment.shape, static_cast<std::uint64_t>(number));
     std::vector<std::string> files;
     std::vector<FrameImage> images;
     files.reserve(pictures.size());

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "live_specimen.h"
 
-#include <sched.h>
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "rig_noise.h"
+#include "rig_setup.h"
+#include "yield_to_others.h"
 
 namespace tenter {
 namespace {
@@ -19,6 +17,8 @@ using namespace std::chrono_literals;
 /// Way of an actuator after which a new equilibrium is due: to first order tensions err by some
 /// micronewtons over it.
 constexpr double kDue_m = 2e-5;
+/// What is less is no motion.
+constexpr double kMoves_m = 1e-5;
 /// Between two solutions, so that the rest of the machine comes to its turn too.
 constexpr auto kPause = 40ms;
 
@@ -31,15 +31,6 @@ bool isDue(const LiveSpecimen::Positions& from, const LiveSpecimen::Positions& t
   return false;
 }
 
-/// What answers the daemon must not wait for the mathematics. Where it cannot be, all is slower.
-void yieldToOthers() {
-  constexpr int kNicer = 5;
-  const auto self = static_cast<id_t>(gettid());
-  const sched_param ordinary{};
-  sched_setscheduler(gettid(), SCHED_OTHER, &ordinary);  // though the program be real-time
-  setpriority(PRIO_PROCESS, self, getpriority(PRIO_PROCESS, self) + kNicer);
-}
-
 }  // namespace
 
 LiveSpecimen::LiveSpecimen(std::unique_ptr<MountedSpecimen> specimen,
@@ -48,6 +39,7 @@ LiveSpecimen::LiveSpecimen(std::unique_ptr<MountedSpecimen> specimen,
       positions_m_(specimen_->moment().at_m),
       moment_(specimen_->moment()),
       still_(makeStill()),
+      flat_(still_ ? std::make_shared<const Still>(Still{{}, flatSample()}) : nullptr),
       friction_{kPulley, kPulley, kPulley, kPulley, kPulley, kPulley, kPulley, kPulley} {
   if (!truth.empty()) truth_.open(truth);
   writeTruth();
@@ -66,6 +58,10 @@ LiveSpecimen::~LiveSpecimen() {
 void LiveSpecimen::moveTo(const Positions& positions_m) {
   const std::lock_guard lock(mutex_);
   positions_m_ = positions_m;
+  for (std::size_t i = 0; i < positions_m.size(); ++i) {
+    if (found_m_[i] == 0.0) found_m_[i] = positions_m[i];
+    hung_ = hung_ || std::abs(positions_m[i] - found_m_[i]) > kMoves_m;
+  }
   for (int i = 0; i < MountedSpecimen::kAxes; ++i) {
     const auto axis = static_cast<std::size_t>(i);
     friction_[axis].follow(
@@ -91,7 +87,7 @@ double LiveSpecimen::felt_N(int axis) const {
 
 std::shared_ptr<const LiveSpecimen::Still> LiveSpecimen::still() const {
   const std::lock_guard lock(mutex_);
-  return still_;
+  return hung_ ? still_ : flat_;
 }
 
 std::shared_ptr<const LiveSpecimen::Still> LiveSpecimen::makeStill() const {
@@ -101,7 +97,7 @@ std::shared_ptr<const LiveSpecimen::Still> LiveSpecimen::makeStill() const {
 }
 
 void LiveSpecimen::run() {
-  yieldToOthers();
+  yieldToOthers(kMathematicsNice);
   std::unique_lock lock(mutex_);
   while (!quitting_) {
     moved_.wait(lock, [this] { return quitting_ || isDue(moment_.at_m, positions_m_); });

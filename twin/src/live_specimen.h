@@ -34,6 +34,8 @@ class LiveSpecimen {
   /// What the cell behind the pulley feels: with the pulley's friction, and none below 0.
   double felt_N(int axis) const;
   /// The last equilibrium, and the actuators' positions that it is of; null if none hangs on cords.
+  /// Until an actuator first moves, the sample as it lies flat: so it is looked at before it is
+  /// hung.
   struct Still {
     Positions at_m{};
     SheetShape shape;
@@ -52,7 +54,9 @@ class LiveSpecimen {
   std::condition_variable moved_;
   Positions positions_m_{};
   MountedSpecimen::Moment moment_;
-  std::shared_ptr<const Still> still_;
+  std::shared_ptr<const Still> still_, flat_;
+  Positions found_m_{};  ///< Where each actuator was when it was first heard of.
+  bool hung_ = false;
   std::array<CordFriction, MountedSpecimen::kAxes> friction_;
   bool quitting_ = false;
   std::thread thread_;

@@ -167,6 +167,13 @@ std::vector<CordPlace> actuatorOrder(const RigSetup& rig) {
   return order;
 }
 
+SheetShape flatSample() {
+  const std::vector<double> ends = {0.0, 0.5 * kSampleSide_m, kSampleSide_m};
+  SheetShape shape{{ends, ends}, {}, {}, {}, {}};
+  shape.nodes = gridSheet(shape.lines).rest.positions;
+  return shape;
+}
+
 std::string axisName(int axis) { return "axis-" + std::to_string(axis + 1); }
 std::string cellName(int axis) { return "cell-" + std::to_string(axis + 1); }
 

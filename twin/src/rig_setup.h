@@ -8,6 +8,7 @@
 #include "tenter/core/measurement.h"
 #include "tenter/mechanics/cloth_system.h"
 #include "tenter/twin/fabrics.h"
+#include "tenter/twin/sheet_shape.h"
 
 namespace tenter {
 
@@ -49,6 +50,9 @@ struct CordPlace {
 /// Cords in the order of the actuators that have them: first those that the protocol works, then
 /// those that only hold, each in the order of the clips.
 std::vector<CordPlace> actuatorOrder(const RigSetup& rig);
+
+/// The sample as it lies flat before clips are put on.
+SheetShape flatSample();
 
 /// Names of the rig's channels, in the order of a session's lists: "axis-1", "cell-1".
 std::string axisName(int axis);

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "tenter/core/files.h"
 #include "tenter/twin/rig_mounting.h"
+#include "yield_to_others.h"
 
 namespace tenter {
 namespace {
@@ -19,9 +21,15 @@ constexpr std::chrono::milliseconds kSetTimeout{10'000};
 
 }  // namespace
 
+void SceneSource::PatientWorkers::on_scheduler_entry(bool is_worker) {
+  if (is_worker) yieldToOthers(kPicturesNice);
+}
+
 SceneSource::SceneSource(std::unique_ptr<SceneRenderer> renderer, Look look,
                          const std::filesystem::path& truth)
-    : renderer_(std::move(renderer)), look_(std::move(look)), truth_(truth) {}
+    : renderer_(std::move(renderer)), look_(std::move(look)), truth_(truth) {
+  patience_.observe(true);
+}
 
 void SceneSource::fill(const ImageRequest& request, std::span<std::uint8_t> pixels) {
   const auto asked = Clock::now();
@@ -46,7 +54,10 @@ void SceneSource::fill(const ImageRequest& request, std::span<std::uint8_t> pixe
 void SceneSource::render(Clock::time_point begin) {
   begin_ = begin;
   const auto still = look_();
-  images_ = renderer_->render(still->shape, number_);
+  std::jthread([&] {
+    yieldToOthers(kPicturesNice);
+    images_ = renderer_->render(still->shape, number_);
+  }).join();
   taken_.assign(images_.size(), false);
   const auto now = Clock::now().time_since_epoch();
   truth_ << nlohmann::json{{"number", number_},

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <tbb/task_scheduler_observer.h>
+
 #include <condition_variable>
 #include <filesystem>
 #include <fstream>
@@ -30,10 +32,16 @@ class SceneSource : public ImageSource {
 
  private:
   using Clock = std::chrono::steady_clock;
+  /// Of the ray tracer.
+  class PatientWorkers : public tbb::task_scheduler_observer {
+   public:
+    void on_scheduler_entry(bool is_worker) override;
+  };
   void render(Clock::time_point begin);
 
   std::unique_ptr<SceneRenderer> renderer_;
   Look look_;
+  PatientWorkers patience_;
   std::ofstream truth_;
   std::mutex mutex_;
   std::vector<ByteImage> images_;

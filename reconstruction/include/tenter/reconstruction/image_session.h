@@ -13,6 +13,9 @@
 
 namespace tenter {
 
+/// Folder in a session with "CAMERA.png": the sample as it lay flat before it was hung.
+inline constexpr const char* kRestFolder = "rest";
+
 /// One set of images and what the rig felt nearest to its moment.
 struct SessionMoment {
   std::int64_t frame = 0, time_ns = 0;
@@ -34,6 +37,7 @@ struct ImageSession {
 
   /// Place in `moments` of the reference: the frame at rest, or the first one.
   std::size_t reference = 0;
+  bool at_rest = false;  ///< The reference shows the sample flat and is no frame of the test.
 };
 
 /// Error, naming file and reason: no such session, no images, no mounting or calibration, one that

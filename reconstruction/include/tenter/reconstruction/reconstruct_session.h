@@ -30,4 +30,8 @@ struct SessionReconstruction {
 Result<SeriesResult> reconstructSession(const ImageSession& session,
                                         const SessionReconstruction& options);
 
+/// Removes the frames that were kept in a `partial` folder, and the folder if nothing else is in
+/// it.
+void discardPartial(const std::filesystem::path& folder);
+
 }  // namespace tenter
