@@ -25,10 +25,10 @@ constexpr const char* kVertices = "40";
 /// A small session of the picture frame, with its truth.
 void render(const TemporaryFolder& folder) {
   const Outcome made =
-      tenter({"twin",  "capture",   "--fabric", "knit-12",     "--protocol", "shear",  "--seed",
-              "3",     "--session", "--frames", "3",           "--nodes",    "17",     "--tracked",
-              kVertices, "--image-width", "640", "--cameras",  "4",          "-o",     "S",
-              "--truth", "T", "--json"},
+      tenter({"twin",   "capture",   "--fabric",  "knit-12",       "--protocol", "shear",
+              "--seed", "3",         "--session", "--frames",      "3",          "--nodes",
+              "17",     "--tracked", kVertices,   "--image-width", "640",        "--cameras",
+              "4",      "-o",        "S",         "--truth",       "T",          "--json"},
              folder.path());
   ASSERT_EQ(made.exit_code, 0) << made.err;
 }
