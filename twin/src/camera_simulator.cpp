@@ -22,7 +22,7 @@ constexpr guint32 kMacHighValue = 0x0200, kMacLowValue = 0x74770000;
 /// While it makes an image a simulator hears nobody; that must not count as its controller's end.
 constexpr guint32 kPatience_ms = 10'000;
 /// How often a simulator looks whether it was triggered.
-constexpr double kTicks_per_s = 250.0;
+constexpr double kTicks_per_s = 1000.0;
 constexpr double kTooMuchLight = 8.0, kNoise_rms = 1.0;
 
 }  // namespace
