@@ -206,11 +206,12 @@ limit_m = 0.05
   capture.output = (folder / "session").string();
   Console quiet = console;
   quiet.json = true;
+  quiet.answer = nlohmann::json::object();
   const auto ended = captureSession(capture, quiet);
   if (!ended) return ended.error();
   if (*ended != kDone) {
     return Error{ErrorKind::kHardware, "tenterd", "",
-                 "the run ended with " + std::to_string(*ended), quiet.answer.dump()};
+                 "the run ended with " + std::to_string(*ended), quiet.answer.value("reason", "")};
   }
   const auto verified = verifySession(folder / "session");
   if (!verified) return verified.error();
