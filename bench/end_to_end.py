@@ -113,7 +113,7 @@ def row(protocol, options, folder):
              ", ".join(f"{100.0 * share:.0f} %" for share in inside),
              f"{1e3 * np.max(np.linalg.norm(errors, axis=1)):.3f} mm", f"{1e3 * rms(clamped):.4f} mm",
              f"{1e3 * rms(got['place']):.4f} mm; {np.degrees(rms(got['turn'])):.3f} deg",
-             f"{np.degrees(rms(got['cords'])):.3f} deg", f"{answer['seconds_per_frame']:.1f}"]
+             f"{np.degrees(rms(got['cords'])):.3f} deg" if got["cords"] else "-", f"{answer['seconds_per_frame']:.1f}"]
     return "| " + " | ".join(cells) + " |", error <= LIMIT_M
 
 

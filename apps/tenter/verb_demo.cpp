@@ -49,7 +49,7 @@ void declare(CLI::App& command, Options& o) {
       .add_option("--frames", o.frames,
                   "Frames of each virtual capture; default: 8, with --full or --no-images 18")
       ->check(CLI::Range(4, 200));
-  command.add_flag("--full", o.full, "More frames, and images of full size: about an hour");
+  command.add_flag("--full", o.full, "18 frames a protocol, 20 boards, and images of full size");
   command.add_flag("--no-images", o.no_images,
                    "Measurements as cameras would make them, without rendering and reconstruction");
   command.add_option("--nodes", o.nodes, "Nodes a side of the virtual specimen")

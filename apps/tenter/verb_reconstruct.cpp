@@ -304,12 +304,8 @@ Result<int> runSession(const Options& o, Console& console) {
   if (!result) return result.error();
   result->warnings.insert(result->warnings.begin(), session->warnings.begin(),
                           session->warnings.end());
-  const auto image = [&](std::size_t frame) -> GrayImage {
-    const int number = result->quality[frame].number;
-    const auto moment = std::find_if(session->moments.begin(), session->moments.end(),
-                                     [&](const SessionMoment& m) { return m.frame == number; });
-    std::vector<std::string> unread;
-    return std::move(readMoment(*session, *moment, unread).front());
+  const auto image = [&](std::size_t frame) {
+    return pictureOf(*session, result->quality[frame].number);
   };
   const auto done = finish(*result, session->views.front(), image, o, console);
   if (done) discardPartial(options.partial);

@@ -210,4 +210,12 @@ std::vector<GrayImage> readMoment(const ImageSession& session, const SessionMome
   return images;
 }
 
+GrayImage pictureOf(const ImageSession& session, std::int64_t frame) {
+  const auto moment = std::find_if(session.moments.begin(), session.moments.end(),
+                                   [&](const SessionMoment& m) { return m.frame == frame; });
+  if (moment == session.moments.end()) return {};
+  std::vector<std::string> unread;
+  return std::move(readMoment(session, *moment, unread).front());
+}
+
 }  // namespace tenter

@@ -25,11 +25,15 @@ std::size_t imagesIn(const std::vector<GrayImage>& images) {
 }
 
 /// What finished frames depend on.
+/// Goes up when frames come out otherwise than before: what an older program kept is done again.
+constexpr int kMethod = 2;
+
 std::string identityOf(const ImageSession& session, const SessionReconstruction& o) {
   const CorrelateOptions& c = o.surface.correlate;
   std::ostringstream text;
   text.precision(17);
-  text << session.identity << '\n'
+  text << kMethod << '\n'
+       << session.identity << '\n'
        << c.match.subset_px << ' ' << c.match.order << ' ' << c.min_zncc << ' ' << c.max_sigma_px
        << ' ' << o.surface.max_residual_px << ' ' << o.surface.vertices_per_side << ' '
        << o.tension.cell_N << ' ' << o.tension.friction_N;

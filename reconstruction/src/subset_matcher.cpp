@@ -22,7 +22,7 @@ constexpr double kLeastFreedom = 20.0;
 constexpr double kInterpolationError_px = 0.0015;
 /// Of a point off the centre of its subset: what terms beyond the warp's order may add, of what the
 /// highest adds.
-constexpr double kTruncation = 0.5;
+constexpr double kTruncation = 1.0;
 /// A subset whose area changes by more than this factor has been folded or lost.
 constexpr double kLargestStretch = 4.0;
 template <int kOrder>

@@ -54,7 +54,7 @@ TEST(ReconstructSession, ARenderedSessionIsMeasuredAgainstTheTruth) {
   ASSERT_EQ(seen->rest->vertexCount(), truth->rest->vertexCount());
   ASSERT_LT((seen->rest->uv - truth->rest->uv).cwiseAbs().maxCoeff(), 1e-9);
   // 0.41 mm a pixel, in a picture frame whose corners are sheared more than subsets can follow.
-  constexpr double kRms_m = 0.02e-3, kWorst_m = 0.3e-3;
+  constexpr double kRms_m = 0.02e-3, kWorst_m = 0.12e-3;
   constexpr double kClamped_m = 0.1e-3, kCord_rad = 0.005;  // 0.3 degrees
   for (std::size_t f = 0; f < seen->frames.size(); ++f) {
     const MeasurementFrame &a = seen->frames[f], &b = truth->frames[f];
@@ -143,15 +143,11 @@ TEST(ReconstructSession, PicturesFromBeforeItWasHungAreTheReference) {
   for (std::size_t f = 0; f < one->frames.size(); ++f) {
     EXPECT_EQ(one->frames[f].positions, other->frames[f].positions);
   }
-  // Without them the first frame would have to show the sample flat and in its place.
+  // Without them the first frame stands in, which is said.
   fs::remove_all(folder / "R/rest");
   const Outcome without = reconstruct(folder, "R", "O");
-  if (without.exit_code == 0) {
-    EXPECT_THAT(without.out, HasSubstr("no frame at rest"));
-  } else {
-    EXPECT_EQ(without.exit_code, 3);
-    EXPECT_THAT(without.err, HasSubstr("rest/CAMERA.png"));
-  }
+  EXPECT_EQ(without.exit_code, 0) << without.err;
+  EXPECT_THAT(without.out, HasSubstr("no frame at rest"));
 }
 
 }  // namespace

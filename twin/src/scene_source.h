@@ -35,6 +35,7 @@ class SceneSource : public ImageSource {
   /// Of the ray tracer.
   class PatientWorkers : public tbb::task_scheduler_observer {
    public:
+    ~PatientWorkers() override { observe(false); }
     void on_scheduler_entry(bool is_worker) override;
   };
   void render(Clock::time_point begin);

@@ -50,4 +50,7 @@ Result<ImageSession> openImageSession(const std::filesystem::path& folder);
 std::vector<GrayImage> readMoment(const ImageSession& session, const SessionMoment& moment,
                                   std::vector<std::string>& warnings);
 
+/// What the first view shows in a frame, for a report; empty if it cannot be read.
+GrayImage pictureOf(const ImageSession& session, std::int64_t frame);
+
 }  // namespace tenter
