@@ -37,6 +37,6 @@ function(tenter_module name)
     target_link_libraries(${name}_tests PRIVATE tenter_${name} tenter_test_support ${ARG_TEST_LIBS}
                                                 GTest::gmock GTest::gtest_main tenter_warnings)
     add_dependencies(unit_tests ${name}_tests)
-    gtest_discover_tests(${name}_tests PROPERTIES LABELS unit DISCOVERY_TIMEOUT 60)
+    gtest_discover_tests(${name}_tests DISCOVERY_TIMEOUT 60 PROPERTIES LABELS unit)
   endif()
 endfunction()
