@@ -77,7 +77,7 @@ def compare(measured, true):
         free = valid.copy()
         free[held] = False
         out["errors"].append(error[free])
-        out["sigmas"].append(m["sigma_m"][free])
+        out["sigmas"].append(m["sigma_axes_m"][free])
         poses = {c["clip"]: c for c in t["clips"]}
         for clip in m["clips"]:
             pose = poses[clip["clip"]]
@@ -106,7 +106,7 @@ def row(protocol, options, folder):
     answer = made(measurement, "reconstruct", session, "-o", measurement, "--report", f"{protocol}.html", folder=folder)
     got = compare(read_measurement(folder / measurement), read_measurement(folder / f"{protocol}-truth/exact"))
     errors, sigmas = np.concatenate(got["errors"]), np.concatenate(got["sigmas"])
-    inside = np.mean(np.abs(errors) <= sigmas[:, None], axis=0)
+    inside = np.mean(np.abs(errors) <= sigmas, axis=0)
     error = rms(np.linalg.norm(errors, axis=1))
     clamped = np.concatenate(got["clamped"]) if got["clamped"] else np.array([np.nan])
     cells = [protocol, str(answer["frames"]), f"{100.0 * got['valid'] / got['all']:.1f} %", f"{1e3 * error:.4f} mm",

@@ -51,6 +51,7 @@ nlohmann::json residualToJson(const TestResidual& r) {
           {"force_rms_N", r.force_rms_N},
           {"position_rms_m", r.position_rms_m},
           {"chi2_per_dof", r.chi2_per_dof},
+          {"discrepancy_m", r.discrepancy_m},
           {"unconverged_frames", r.unconverged_frames},
           {"unstable_frames", r.unstable_frames},
           {"multistable_frames", r.multistable_frames}};

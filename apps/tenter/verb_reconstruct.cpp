@@ -258,6 +258,7 @@ Result<int> runImages(const Options& o, Console& console) {
   Progress progress(console);
   SeriesOptions options;
   options.surface = surfaceOptions(o);
+  options.calibration = &*calibration;
   if (*roi) {
     options.inside = [region = **roi](const Vec2& pixel) {
       return (pixel.array() >= region.least.array()).all() &&

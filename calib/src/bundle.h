@@ -49,6 +49,7 @@ struct BundleOptions {
   bool heavy = false;    ///< Cauchy's loss, for data with outliers still in it.
   bool fit_lenses = true, fit_cameras = true, fit_warp = false;
   int max_iterations = 100;
+  int rig_set = -1;  ///< Set whose board's pose the covariance holds too; -1: none.
 };
 
 /// Minimises over the poses of all boards that images show, and what the options free. Writes the
@@ -65,11 +66,12 @@ double rmsOf(const Bundle& bundle, const BundleImage& image);
 /// Over the corners of all images for which `wanted` holds; 0 if there are none.
 double rmsOf(const Bundle& bundle, const std::function<bool(const BundleImage&)>& wanted);
 
-/// Covariance of cameras and warp at an optimum, boards integrated out.
+/// Covariance of cameras, warp and the rig's board at an optimum, other boards integrated out.
 struct BundleCovariance {
   /// Per camera: kLensTerms of its lens, then, but for camera 0, its pose: small rotation [rad] and
   /// displacement [m] in the camera's frame (camera_from_world = [exp(rotation) R | t +
-  /// displacement]). Last the warp, if fitted.
+  /// displacement]). Then the warp, if fitted, and the pose of the board of `rig_set`, in the
+  /// world.
   Eigen::MatrixXd matrix;
   double noise_px =
       0.0;  ///< Standard deviation of a coordinate: sqrt(sum r^2 / (2 n - parameters)).

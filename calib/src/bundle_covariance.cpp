@@ -38,6 +38,10 @@ std::vector<double*> wantedBlocks(Bundle& bundle, const BundleOptions& options, 
     blocks.push_back(bundle.warp_m.data());
     size += 2;
   }
+  if (options.rig_set >= 0) {
+    blocks.push_back(bundle.boards[options.rig_set].data());
+    size += 6;
+  }
   return blocks;
 }
 
@@ -69,12 +73,17 @@ Eigen::MatrixXd scaledInverse(const Eigen::MatrixXd& matrix) {
 }
 
 /// Poses as small rotations on the left in the place of rotation vectors.
-void turnIntoSmallRotations(const Bundle& bundle, Eigen::MatrixXd& covariance) {
+void turnIntoSmallRotations(const Bundle& bundle, const BundleOptions& options,
+                            Eigen::MatrixXd& covariance) {
   Eigen::MatrixXd change = Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols());
   for (std::size_t camera = 1; camera < bundle.cameras.size(); ++camera) {
     const auto at =
         static_cast<Eigen::Index>(kLensTerms + (camera - 1) * (kLensTerms + 6) + kLensTerms);
     change.block<3, 3>(at, at) = leftJacobian(bundle.cameras[camera].head<3>());
+  }
+  if (options.rig_set >= 0) {
+    const Eigen::Index at = covariance.rows() - 6;
+    change.block<3, 3>(at, at) = leftJacobian(bundle.boards[options.rig_set].head<3>());
   }
   covariance = change * covariance * change.transpose();
 }
@@ -86,8 +95,9 @@ BundleCovariance bundleCovariance(Bundle& bundle, const BundleOptions& options) 
   const auto problem = bundleProblem(bundle, options);
   int wanted = 0;
   std::vector<double*> blocks = wantedBlocks(bundle, options, wanted);
-  for (PoseVector& board : bundle.boards) {
-    if (problem->HasParameterBlock(board.data())) blocks.push_back(board.data());
+  for (int set = 0; set < static_cast<int>(bundle.boards.size()); ++set) {
+    double* board = bundle.boards[set].data();
+    if (set != options.rig_set && problem->HasParameterBlock(board)) blocks.push_back(board);
   }
   const Eigen::MatrixXd inverse = scaledInverse(information(*problem, blocks));
   double squares = 0.0, numbers = 0.0;
@@ -99,7 +109,7 @@ BundleCovariance bundleCovariance(Bundle& bundle, const BundleOptions& options) 
   if (!out.observable) return out;
   out.noise_px = std::sqrt(squares / (numbers - static_cast<double>(inverse.rows())));
   out.matrix = out.noise_px * out.noise_px * inverse.topLeftCorner(wanted, wanted);
-  turnIntoSmallRotations(bundle, out.matrix);
+  turnIntoSmallRotations(bundle, options, out.matrix);
   return out;
 }
 

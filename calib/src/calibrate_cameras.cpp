@@ -164,29 +164,61 @@ std::vector<RejectedImage> rejectedOf(const CameraPhotos& camera, const LeftOut&
   return rejected;
 }
 
+/// Set of the board that lies in the rig's plane; -1 if none does, or no usable image shows it.
+int rigSet(const Work& w) {
+  if (!w.options.rig_index) return -1;
+  const auto found = std::find(w.indices.begin(), w.indices.end(), *w.options.rig_index);
+  const int set = static_cast<int>(found - w.indices.begin());
+  const bool used = std::any_of(w.bundle.images.begin(), w.bundle.images.end(),
+                                [&](const BundleImage& image) { return image.set == set; });
+  return found != w.indices.end() && used ? set : -1;
+}
+
+/// The board's z points into it, the rig's up; both x along the rows; origin in the board's middle.
+Eigen::Isometry3d boardFromRig(const Bundle& bundle) {
+  Eigen::Isometry3d board_from_rig = Eigen::Isometry3d::Identity();
+  board_from_rig.linear() = Vec3(1.0, -1.0, -1.0).asDiagonal();
+  board_from_rig.translation() = bundle.board_m.rowwise().mean();
+  return board_from_rig;
+}
+
+/// The rig's origin moves with the board's corner, and when the board turns about that.
+void moveToRigOrigin(const Bundle& bundle, int set, Eigen::MatrixXd& covariance) {
+  const Vec3 arm = poseOf(bundle.boards[set]).linear() * Vec3(boardFromRig(bundle).translation());
+  Eigen::MatrixXd change = Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols());
+  const Eigen::Index at = covariance.rows() - 6;
+  for (int axis = 0; axis < 3; ++axis)
+    change.block<3, 1>(at + 3, at + axis) = Vec3(Vec3::Unit(axis)).cross(arm);
+  covariance = change * covariance * change.transpose();
+}
+
+void namePose(const std::string& name, CameraCalibration& c) {
+  for (const char* part : {".rotation_rad", ".translation_m"}) {
+    for (const char* axis : {"[0]", "[1]", "[2]"}) c.parameters.push_back(name + part + axis);
+  }
+}
+
 void nameParameters(const Work& w, CameraCalibration& c) {
   static constexpr const char* kLens[] = {"fx_px", "fy_px", "cx_px", "cy_px", "k1",
                                           "k2",    "p1",    "p2",    "k3"};
   for (std::size_t camera = 0; camera < w.photos.size(); ++camera) {
     for (const char* term : kLens) c.parameters.push_back(w.photos[camera].name + "." + term);
-    if (camera == 0) continue;
-    for (const char* part : {".rotation_rad", ".translation_m"}) {
-      for (const char* axis : {"[0]", "[1]", "[2]"}) {
-        c.parameters.push_back(w.photos[camera].name + part + axis);
-      }
-    }
+    if (camera > 0) namePose(w.photos[camera].name, c);
   }
   if (w.fit.fit_warp) {
     c.parameters.emplace_back("board.warp_m[0]");
     c.parameters.emplace_back("board.warp_m[1]");
   }
+  if (w.fit.rig_set >= 0) namePose(std::string(kRigPose), c);
 }
 
 void addUncertainty(Work& w, CameraCalibration& c) {
+  w.fit.rig_set = rigSet(w);
   BundleCovariance covariance = bundleCovariance(w.bundle, w.fit);
   if (!covariance.observable) return;
   nameParameters(w, c);
   c.covariance = std::move(covariance.matrix);
+  if (w.fit.rig_set >= 0) moveToRigOrigin(w.bundle, w.fit.rig_set, c.covariance);
   c.quality.noise_px = covariance.noise_px;
   const Eigen::VectorXd sigma = c.covariance.diagonal().cwiseSqrt();
   Eigen::Index at = 0;
@@ -198,7 +230,7 @@ void addUncertainty(Work& w, CameraCalibration& c) {
     c.cameras[camera].translation_sigma_m = sigma.segment<3>(at + 3);
     at += 6;
   }
-  if (w.fit.fit_warp) c.warp_sigma_m = sigma.tail<2>();
+  if (w.fit.fit_warp) c.warp_sigma_m = sigma.segment<2>(at);
 }
 
 bool isShared(const Bundle& bundle, const BundleImage& image) {
@@ -209,22 +241,12 @@ bool isShared(const Bundle& bundle, const BundleImage& image) {
 
 Result<void> addRig(const Work& w, CameraCalibration& c) {
   if (!w.options.rig_index) return {};
-  const int index = *w.options.rig_index;
-  const auto found = std::find(w.indices.begin(), w.indices.end(), index);
-  const int set = static_cast<int>(found - w.indices.begin());
-  const bool used = found != w.indices.end() &&
-                    std::any_of(w.bundle.images.begin(), w.bundle.images.end(),
-                                [&](const BundleImage& image) { return image.set == set; });
-  if (!used) {
-    return rejection("index " + std::to_string(index),
+  const int set = rigSet(w);
+  if (set < 0) {
+    return rejection("index " + std::to_string(*w.options.rig_index),
                      "no usable image shows the board that lies in the rig's plane", "");
   }
-  // The board's z points into it, the rig's up; both x along the rows; origin in the board's
-  // middle.
-  Eigen::Isometry3d board_from_rig = Eigen::Isometry3d::Identity();
-  board_from_rig.linear() = Vec3(1.0, -1.0, -1.0).asDiagonal();
-  board_from_rig.translation() = w.bundle.board_m.rowwise().mean();
-  const Eigen::Isometry3d world_from_rig = poseOf(w.bundle.boards[set]) * board_from_rig;
+  const Eigen::Isometry3d world_from_rig = poseOf(w.bundle.boards[set]) * boardFromRig(w.bundle);
   c.rig = RigFrame{world_from_rig.inverse(), world_from_rig.linear() * kDefaultGravity};
   return {};
 }

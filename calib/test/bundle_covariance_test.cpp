@@ -10,7 +10,7 @@
 namespace tenter {
 namespace {
 
-constexpr int kRuns = 30, kSets = 10;
+constexpr int kRuns = 30, kSets = 10, kRigSet = 2;
 constexpr double kNoise_px = 0.1;
 const Vec2 kWarp_m(2e-4, -1e-4);
 
@@ -27,6 +27,13 @@ Bundle truth(const Board& board, const std::vector<virtual_rig::Camera>& cameras
   return bundle;
 }
 
+/// A small turn on the left and a displacement that take one pose to the other.
+std::pair<Vec3, Vec3> changeOf(const PoseVector& fit, const PoseVector& truth) {
+  const auto is = poseOf(fit), was = poseOf(truth);
+  const Eigen::AngleAxisd turn(Mat3(is.linear() * was.linear().transpose()));
+  return {turn.angle() * turn.axis(), is.translation() - was.translation()};
+}
+
 /// Fit minus truth in the parameters of BundleCovariance.
 Eigen::VectorXd errorOf(const Bundle& fit, const Bundle& true_bundle) {
   std::vector<double> out;
@@ -36,12 +43,14 @@ Eigen::VectorXd errorOf(const Bundle& fit, const Bundle& true_bundle) {
   for (std::size_t i = 0; i < fit.lenses.size(); ++i) {
     append(LensVector(fit.lenses[i] - true_bundle.lenses[i]));
     if (i == 0) continue;
-    const auto is = poseOf(fit.cameras[i]), was = poseOf(true_bundle.cameras[i]);
-    const Eigen::AngleAxisd turn(Mat3(is.linear() * was.linear().transpose()));
-    append(Vec3(turn.angle() * turn.axis()));
-    append(Vec3(is.translation() - was.translation()));
+    const auto [turn, shift] = changeOf(fit.cameras[i], true_bundle.cameras[i]);
+    append(turn);
+    append(shift);
   }
   append(Vec2(fit.warp_m - true_bundle.warp_m));
+  const auto [turn, shift] = changeOf(fit.boards[kRigSet], true_bundle.boards[kRigSet]);
+  append(turn);
+  append(shift);
   return Eigen::Map<Eigen::VectorXd>(out.data(), static_cast<Eigen::Index>(out.size()));
 }
 
@@ -53,6 +62,7 @@ TEST(BundleCovarianceTest, AgreesWithThirtyRedrawnFits) {
   const Bundle true_bundle = truth(board, cameras, poses);
   BundleOptions options;
   options.fit_warp = true;
+  options.rig_set = kRigSet;
   double mahalanobis = 0.0, noise = 0.0;
   Eigen::VectorXd squares, predicted;
   for (int run = 0; run < kRuns; ++run) {

@@ -149,6 +149,13 @@ Result<void> checkPositions(const Measurement& m, const MeasurementFrame& frame,
             "has " + std::to_string(frame.position_sigma_m.size()) + " entries" + wanted);
   out.check(static_cast<Eigen::Index>(frame.valid.size()) == count, "point array \"valid\"",
             "has " + std::to_string(frame.valid.size()) + " entries" + wanted);
+  const Points3& axes = frame.position_sigma_axes_m;
+  out.check(axes.cols() == 0 || axes.cols() == count, "point array \"sigma_axes_m\"",
+            "has " + std::to_string(axes.cols()) + " entries" + wanted);
+  for (Eigen::Index v = 0; v < axes.cols() && out.ok(); ++v)
+    out.check((axes.col(v).array() >= 0.0 && axes.col(v).array() <= kMaxSigma_m).all(),
+              "vertex " + std::to_string(v), "sigma_axes_m must lie between 0 and 0.05 m",
+              kCheckUnit);
   for (Eigen::Index v = 0; v < count && out.ok(); ++v) {
     const std::uint8_t valid = frame.valid[static_cast<std::size_t>(v)];
     const double sigma = frame.position_sigma_m[v];

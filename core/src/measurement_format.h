@@ -19,6 +19,7 @@ inline constexpr const char* kRestFile = "rest.vtp";
 inline constexpr const char* kPvdFile = "frames.pvd";
 inline constexpr const char* kFramesFolder = "frames";
 inline constexpr const char* kSigmaArray = "sigma_m";
+inline constexpr const char* kSigmaAxesArray = "sigma_axes_m";
 inline constexpr const char* kValidArray = "valid";
 inline constexpr int kMaxFrames = 100'000;
 

@@ -189,6 +189,14 @@ Result<void> readFrameMesh(const fs::path& file, const TriangleMesh& rest,
   }
   frame.positions = std::move(read->mesh.positions);
   frame.position_sigma_m = read->data.point[format::kSigmaArray].transpose();
+  if (const auto axes = read->data.point.find(format::kSigmaAxesArray);
+      axes != read->data.point.end()) {
+    if (axes->second.rows() != 3) {
+      return badInput(name, std::string("point array \"") + format::kSigmaAxesArray + "\"",
+                      "has " + std::to_string(axes->second.rows()) + " components instead of 3");
+    }
+    frame.position_sigma_axes_m = axes->second;
+  }
   const Eigen::MatrixXd& valid = read->data.point[format::kValidArray];
   for (Eigen::Index v = 0; v < valid.cols(); ++v) {
     if (valid(0, v) != 0.0 && valid(0, v) != 1.0) {

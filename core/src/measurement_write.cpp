@@ -118,6 +118,8 @@ Result<void> writeFrameMesh(const fs::path& folder, const Measurement& m, std::s
   const TriangleMesh mesh{frame.positions, m.rest->triangles, {}};
   MeshData data;
   data.point[format::kSigmaArray] = frame.position_sigma_m.transpose();
+  if (frame.position_sigma_axes_m.cols() > 0)
+    data.point[format::kSigmaAxesArray] = frame.position_sigma_axes_m;
   data.point[format::kValidArray] =
       Eigen::Map<const Eigen::Matrix<std::uint8_t, 1, Eigen::Dynamic>>(
           frame.valid.data(), static_cast<Eigen::Index>(frame.valid.size()))

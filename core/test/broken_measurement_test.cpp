@@ -416,6 +416,17 @@ INSTANTIATE_TEST_SUITE_P(
             "frame_sigma_negative", kFrameMesh,
             [](MeshFile& f) { f.data.point["sigma_m"](0, 3) = -1e-5; }, "vertex 3", "sigma_m"),
         mesh(
+            "frame_sigma_axes_two", kFrameMesh,
+            [](MeshFile& f) { f.data.point["sigma_axes_m"] = Eigen::MatrixXd::Ones(2, 16); },
+            "sigma_axes_m", "has 2 components instead of 3"),
+        mesh(
+            "frame_sigma_axes_negative", kFrameMesh,
+            [](MeshFile& f) {
+              f.data.point["sigma_axes_m"] = Eigen::MatrixXd::Constant(3, 16, 1e-5);
+              f.data.point["sigma_axes_m"](2, 3) = -1e-5;
+            },
+            "vertex 3", "sigma_axes_m"),
+        mesh(
             "frame_valid_half", kFrameMesh, [](MeshFile& f) { f.data.point["valid"](0, 2) = 0.5; },
             "vertex 2", "0 or 1"),
         mesh(

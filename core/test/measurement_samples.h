@@ -75,6 +75,10 @@ inline Measurement stretchTest(int nodes = 4, int frames = 3) {
     frame.positions = m.rest->positions;
     frame.positions.row(0) *= stretch;
     frame.position_sigma_m.setConstant(nodes * nodes, 5e-5);
+    if (!m.frames.empty()) {  // not every frame knows its axes apart
+      frame.position_sigma_axes_m.resize(3, nodes * nodes);
+      frame.position_sigma_axes_m.colwise() = Vec3(3e-5, 4e-5, 7e-5);
+    }
     frame.valid.assign(static_cast<std::size_t>(nodes * nodes), 1);
     frame.valid[1] = 0;
     m.frames.push_back(frame);

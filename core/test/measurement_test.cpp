@@ -26,6 +26,7 @@ void expectSameFrame(const MeasurementFrame& a, const MeasurementFrame& b) {
   EXPECT_EQ(a.branch, b.branch);
   EXPECT_EQ(a.positions, b.positions);
   EXPECT_EQ(a.position_sigma_m, b.position_sigma_m);
+  EXPECT_EQ(a.position_sigma_axes_m, b.position_sigma_axes_m);
   EXPECT_EQ(a.valid, b.valid);
   ASSERT_EQ(a.clips.size(), b.clips.size());
   for (std::size_t i = 0; i < a.clips.size(); ++i) {
@@ -105,6 +106,7 @@ TEST(MeasurementTest, FramesMayLackAMesh) {
   Measurement m = samples::stretchTest();
   m.frames[1].positions.resize(3, 0);
   m.frames[1].position_sigma_m.resize(0);
+  m.frames[1].position_sigma_axes_m.resize(3, 0);
   m.frames[1].valid.clear();
   ASSERT_TRUE(writeMeasurement(folder / "m", m).ok());
   EXPECT_THAT(listFolder(folder / "m/frames"), ElementsAre("000000.vtp", "000002.vtp"));

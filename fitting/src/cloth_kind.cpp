@@ -38,8 +38,12 @@ struct ClothFrame {
   std::optional<PositionResiduals> positions;
 };
 
-TrackedFrame tracked(const MeasurementFrame& frame) {
-  return {frame.positions, frame.position_sigma_m, frame.valid};
+/// A misfit beyond the noise by less than this share of it is not told from noise, and an estimate
+/// that changes by less stays: weights would change in every round.
+constexpr double kToldFromNoise = 0.1;
+
+TrackedFrame tracked(const MeasurementFrame& frame, double discrepancy_m = 0.0) {
+  return {frame.positions, frame.position_sigma_m, frame.valid, discrepancy_m};
 }
 
 /// Forces over all clips balance the cloth's weight whatever its stiffness: orthonormal
@@ -78,6 +82,8 @@ class ClothTest final : public SimulatedTest {
   }
   double constantCost() const override;
   int constantCount() const override;
+  bool updateDiscrepancy() override;
+  double discrepancy_m() const override { return discrepancy_m_; }
 
  protected:
   ClothState startState(const Simulation& simulation, int frame) const override;
@@ -97,12 +103,14 @@ class ClothTest final : public SimulatedTest {
   Eigen::MatrixXd comparedRows(const Grid& grid, const MeasurementFrame& frame,
                                const ClipForces& forces) const;
   static void updateWhitener(ClothFrame& frame);
+  void weighPositions();
   void fillForces(const SolvedFrame& solved, FramePrediction& prediction) const;
   void fillDrop(const SolvedFrame& solved, FramePrediction& prediction) const;
 
   const ProtocolFamily& family_;
   std::vector<Grid> grids_;
   std::vector<ClothFrame> cloth_;
+  double discrepancy_m_ = 0.0;  ///< One for all frames; docs/fitting-tests.md.
 };
 
 Result<void> ClothTest::prepare() {
@@ -221,6 +229,39 @@ ClothFrame ClothTest::makeFrame(int grid, const MeasurementFrame& frame) const {
     out.positions.emplace(grids_[grid].interpolation, tracked(frame), out.start, like);
   }
   return out;
+}
+
+/// Variance components by moments: mean squared misfit = mean sigma^2 + discrepancy^2.
+bool ClothTest::updateDiscrepancy() {
+  PositionMisfit misfit;
+  for (int f = 0; f < frameCount(); ++f)
+    if (const ClothState* state = acceptedState(f); state && cloth_[f].positions)
+      addPositionMisfit(grids_[cloth_[f].grid].interpolation, tracked(measured(f)),
+                        state->positions(static_cast<int>(cloth_[f].start.cols())), misfit);
+  if (misfit.coordinates == 0) return false;
+  const double excess_m2 = misfit.squares_m2 - misfit.noise_m2;
+  const bool told = excess_m2 > kToldFromNoise * misfit.noise_m2;
+  const double fresh_m =
+      told ? std::sqrt(excess_m2 / static_cast<double>(misfit.coordinates)) : 0.0;
+  if (std::abs(fresh_m - discrepancy_m_) <= kToldFromNoise * std::max(fresh_m, discrepancy_m_))
+    return false;
+  discrepancy_m_ = fresh_m;
+  weighPositions();
+  reweigh();
+  return true;
+}
+
+void ClothTest::weighPositions() {
+  const PositionResiduals* like = nullptr;
+  int like_grid = -1;
+  for (int f = 0; f < frameCount(); ++f) {
+    ClothFrame& frame = cloth_[f];
+    if (!frame.positions) continue;
+    frame.positions.emplace(grids_[frame.grid].interpolation, tracked(measured(f), discrepancy_m_),
+                            frame.start, like_grid == frame.grid ? like : nullptr);
+    like = &*frame.positions;
+    like_grid = frame.grid;
+  }
 }
 
 double ClothTest::constantCost() const {

@@ -57,6 +57,7 @@ void judgeTests(FitRun& run, const FitStatistics* statistics, FitResult& result)
     TestResidual residual = summarizeTest(
         *tests[t], judgedFrames(run.evaluator(), static_cast<int>(t), result.cancelled));
     if (statistics) residual.chi2_per_dof = statistics->tests[t].chi2_per_dof;
+    residual.discrepancy_m = tests[t]->discrepancy_m();
     if (!result.cancelled) residual.multistable_frames = countMultistable(*tests[t], threads);
     if (residual.unconverged_frames > 0)
       result.warnings.push_back(std::to_string(residual.unconverged_frames)

@@ -65,6 +65,7 @@ nlohmann::json toJson(const TestResidual& r) {
           {"force_nrmse", number(r.force_nrmse)},
           {"position_rms_m", number(r.position_rms_m)},
           {"chi2_per_dof", number(r.chi2_per_dof)},
+          {"discrepancy_m", number(r.discrepancy_m)},
           {"unconverged_frames", r.unconverged_frames},
           {"unstable_frames", r.unstable_frames},
           {"multistable_frames", r.multistable_frames}};

@@ -121,7 +121,10 @@ std::vector<FrameId> FitRun::framesOf(const std::vector<int>& tests, int per_tes
 }
 
 void FitRun::reweigh(const std::vector<int>& tests) {
-  for (const int t : tests) tests_[t]->reweigh();
+  for (const int t : tests) {
+    tests_[t]->updateDiscrepancy();
+    tests_[t]->reweigh();
+  }
 }
 
 void FitRun::noteDropped(int dropped, const std::string& stage) {
@@ -268,6 +271,9 @@ bool FitRun::refineBlock(const FitBlock& block, int pass) {
     if (evaluator_.cancelled()) return true;
     reweigh(block.tests);
   }
+  // What the early frames and the first curves missed was not all the law's.
+  if (pass >= 1)
+    for (const int t : block.tests) tests_[t]->updateDiscrepancy();
   if (pass == 1) reconsiderShapes(block);
   return solve(block.groups, block.tests, 0, tight, "all frames");
 }

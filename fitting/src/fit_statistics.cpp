@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fit_statistics.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
@@ -13,6 +14,13 @@ namespace {
 constexpr double kAtBound = 1e-9;
 /// A knot's relative error refers to at least this share of the curve's largest stiffness.
 constexpr double kSmallKnot = 0.05;
+/// A test is cut into at most so many runs of consecutive frames, whose misfits count as
+/// independent.
+constexpr int kRuns = 10;
+/// Misfit per degree of freedom beyond which the law and not noise is what is missed.
+constexpr double kMissedByLaw = 1.5;
+/// A run that says nearly all there is about something has nothing left to disagree with.
+constexpr double kLeastLeft = 0.05;
 /// Terms of a combination lighter than this are not listed.
 constexpr double kLightTerm = 0.1;
 
@@ -38,14 +46,50 @@ std::vector<TestInformation> gather(const FrameEvaluator& evaluator,
     tests[t].gradient = Eigen::VectorXd::Zero(n);
     tests[t].residuals = evaluator.rawResidualCount(static_cast<int>(t));
   }
+  std::vector<int> frames(tests.size(), 0), seen(tests.size(), 0);
+  for (const FrameId& id : evaluator.frames()) ++frames[id.test];
+  for (std::size_t t = 0; t < tests.size(); ++t)
+    tests[t].runs.assign(std::min(kRuns, frames[t]),
+                         {Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)});
   for (std::size_t i = 0; i < evaluator.frames().size(); ++i) {
     const FrameBlock& block = evaluator.blocks()[i];
-    TestInformation& test = tests[evaluator.frames()[i].test];
-    test.normal.noalias() += block.jacobian.transpose() * block.jacobian;
-    test.gradient.noalias() += block.jacobian.transpose() * block.residuals;
+    const int t = evaluator.frames()[i].test;
+    TestInformation& test = tests[t];
+    TestInformation::Run& run =
+        test.runs[seen[t]++ * static_cast<int>(test.runs.size()) / frames[t]];
+    run.normal.noalias() += block.jacobian.transpose() * block.jacobian;
+    run.gradient.noalias() += block.jacobian.transpose() * block.residuals;
     test.chi2 += block.residuals.squaredNorm();
   }
+  for (TestInformation& test : tests)
+    for (const TestInformation::Run& run : test.runs) {
+      test.normal += run.normal;
+      test.gradient += run.gradient;
+    }
   return tests;
+}
+
+/// What runs of frames disagree about: the middle of the sandwich for clustered errors [LZ86]. A
+/// run draws the optimum towards itself, the more the more it says: in coordinates where all tests'
+/// information is the identity, dividing by I - (its own information) undoes that [BM02].
+Eigen::MatrixXd disagreement(const TestInformation& test, const Eigen::MatrixXd& information) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(information);
+  const auto n = information.rows();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n, n);
+  for (const TestInformation::Run& run : test.runs) {
+    const Eigen::MatrixXd own = test.own.asDiagonal() * run.normal * test.own.asDiagonal();
+    const Eigen::MatrixXd half = factor.matrixL().solve(own);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> share(
+        factor.matrixL().solve(half.transpose()));
+    const Eigen::VectorXd left = (1.0 - share.eigenvalues().array()).max(kLeastLeft);
+    const Eigen::VectorXd gradient = test.own.cwiseProduct(run.gradient);
+    const Eigen::VectorXd seen =
+        share.eigenvectors().transpose() * factor.matrixL().solve(gradient);
+    const Eigen::VectorXd undone =
+        factor.matrixL() * (share.eigenvectors() * seen.cwiseQuotient(left));
+    sum += undone * undone.transpose();
+  }
+  return sum;
 }
 
 std::vector<bool> entriesAtBound(const FitSpace& space, const Eigen::VectorXd& z) {
@@ -91,13 +135,20 @@ FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<F
   statistics.at_bound = entriesAtBound(evaluator.space(), z);
   Eigen::MatrixXd equations = vagueInformation(evaluator.space().size());
   Eigen::MatrixXd noise = equations;
-  for (const TestInformation& test : statistics.tests) equations += test.equations();
+  Eigen::MatrixXd information = equations;
+  for (const TestInformation& test : statistics.tests) {
+    equations += test.equations();
+    information += test.equations() * test.own.asDiagonal();
+  }
   const Eigen::MatrixXd inverse = inverseOfFree(equations, statistics.at_bound);
 
-  for (TestInformation& test : statistics.tests) {
+  for (std::size_t t = 0; t < statistics.tests.size(); ++t) {
+    TestInformation& test = statistics.tests[t];
     const double taken = (inverse * test.equations()).trace();
     test.chi2_per_dof = test.chi2 / std::max(1.0, test.residuals - taken);
     noise += std::max(1.0, test.chi2_per_dof) * test.equations() * test.own.asDiagonal();
+    const bool by_law = evaluator.tests()[t]->discrepancy_m() > 0.0;
+    if (by_law || test.chi2_per_dof > kMissedByLaw) noise += disagreement(test, information);
   }
   statistics.covariance = covarianceOf(inverse, noise);
   return statistics;

@@ -24,6 +24,12 @@ struct TestInformation {
   Eigen::VectorXd own;       ///< 1 for entries of z that are fitted to this test, 0 for others.
   Eigen::MatrixXd normal;    ///< Sum of J^T J.
   Eigen::VectorXd gradient;  ///< Sum of J^T r.
+  /// Normal matrix and gradient of a part of its frames, consecutive ones.
+  struct Run {
+    Eigen::MatrixXd normal;
+    Eigen::VectorXd gradient;
+  };
+  std::vector<Run> runs;
 
   /// Rows: what this test contributes to the equations that determine its own entries.
   Eigen::MatrixXd equations() const { return own.asDiagonal() * normal; }
@@ -38,8 +44,8 @@ struct TestInformation {
 struct FitStatistics {
   std::vector<TestInformation> tests;
   std::vector<bool> at_bound;  ///< Of each entry of z.
-  Eigen::MatrixXd
-      covariance;  ///< Of z; zero at bounds. Misfit beyond the noise widens it, test by test.
+  Eigen::MatrixXd covariance;  ///< Of z; zero at bounds. Misfit beyond the noise widens it, test by
+                               ///< test, and so does disagreement between runs of frames.
 };
 
 /// Of the point that the evaluator evaluated last, with all its frames valid.

@@ -55,10 +55,15 @@ Sparse selection(Eigen::Index all, const std::vector<int>& chosen) {
 
 }  // namespace
 
+double TrackedFrame::variance_m2(Eigen::Index vertex) const {
+  const double stated = sigma_m.size() > 0 ? sigma_m[vertex] : 0.0;
+  const double sigma = stated > 0.0 ? stated : kDefaultSigma_m;
+  return sigma * sigma;
+}
+
 double TrackedFrame::weight(Eigen::Index vertex) const {
   if (!seen(vertex)) return 0.0;
-  const double sigma = sigma_m.size() > 0 ? sigma_m[vertex] : 0.0;
-  return 1.0 / (sigma > 0.0 ? sigma : kDefaultSigma_m);
+  return 1.0 / std::sqrt(variance_m2(vertex) + discrepancy_m * discrepancy_m);
 }
 
 std::shared_ptr<const PositionResiduals::Factor> PositionResiduals::factorize(
@@ -195,19 +200,25 @@ void fillMeasuredShape(const Interpolation& p, const TrackedFrame& frame, const 
     nodes.col(free[i]) = solution.row(static_cast<Eigen::Index>(i)).transpose();
 }
 
+void addPositionMisfit(const Interpolation& p, const TrackedFrame& frame,
+                       const Eigen::Ref<const Points3>& nodes, PositionMisfit& sums) {
+  if (frame.positions.cols() != p.rows()) return;
+  const Eigen::MatrixX3d error = p * nodes.transpose() - frame.positions.transpose();
+  for (Eigen::Index v = 0; v < error.rows(); ++v) {
+    if (!frame.seen(v)) continue;
+    sums.squares_m2 += error.row(v).squaredNorm();
+    sums.noise_m2 += 3.0 * frame.variance_m2(v);
+    sums.coordinates += 3;
+  }
+}
+
 double positionRms(const Interpolation& p, const TrackedFrame& frame,
                    const Eigen::Ref<const Points3>& nodes) {
-  double sum = 0.0;
-  int count = 0;
-  if (frame.positions.cols() == p.rows()) {
-    const Eigen::MatrixX3d error = p * nodes.transpose() - frame.positions.transpose();
-    for (Eigen::Index v = 0; v < error.rows(); ++v)
-      if (frame.seen(v)) {
-        sum += error.row(v).squaredNorm();
-        ++count;
-      }
-  }
-  return count > 0 ? std::sqrt(sum / count) : std::numeric_limits<double>::quiet_NaN();
+  PositionMisfit sums;
+  addPositionMisfit(p, frame, nodes, sums);
+  return sums.coordinates > 0
+             ? std::sqrt(3.0 * sums.squares_m2 / static_cast<double>(sums.coordinates))
+             : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace tenter

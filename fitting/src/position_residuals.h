@@ -15,9 +15,12 @@ struct TrackedFrame {
   const Points3& positions;                ///< 3 x vertices.
   const Eigen::VectorXd& sigma_m;          ///< Per vertex; empty or zero: [Est12] sec. 3.3.
   const std::vector<std::uint8_t>& valid;  ///< Per vertex; empty: all.
+  double discrepancy_m = 0.0;  ///< Of a law that cannot follow: adds to every sigma, squared.
 
   bool seen(Eigen::Index vertex) const { return valid.empty() || valid[vertex] != 0; }
-  double weight(Eigen::Index vertex) const;  ///< 1 / sigma [1/m]; 0 if not seen.
+  double variance_m2(Eigen::Index vertex) const;  ///< Per axis, of the noise alone.
+  /// 1 / standard deviation, discrepancy included [1/m]; 0 if not seen.
+  double weight(Eigen::Index vertex) const;
 };
 
 /// The residuals of thousands of vertices as few residuals at the nodes, without loss: with the
@@ -68,6 +71,14 @@ class PositionResiduals {
 void fillMeasuredShape(const Interpolation& interpolation, const TrackedFrame& frame,
                        const GridLines& lines, const Points3& rest, const std::vector<bool>& held,
                        Points3& nodes);
+
+/// Squared errors of the vertices that are seen, and what noise alone makes of them.
+struct PositionMisfit {
+  double squares_m2 = 0.0, noise_m2 = 0.0;
+  Eigen::Index coordinates = 0;
+};
+void addPositionMisfit(const Interpolation& interpolation, const TrackedFrame& frame,
+                       const Eigen::Ref<const Points3>& nodes, PositionMisfit& sums);
 
 /// Root mean square of the vertices' vector errors [m]; NaN when none is seen.
 double positionRms(const Interpolation& interpolation, const TrackedFrame& frame,

@@ -74,6 +74,10 @@ class SimulatedTest : public FitTest {
   const MeasurementFrame& measured(int frame) const {
     return measurement_->frames[frames_[frame].source];
   }
+  /// Null before accept() saw a converged state of the frame.
+  const ClothState* acceptedState(int frame) const {
+    return frames_[frame].accepted.generation >= 0 ? &frames_[frame].accepted.state : nullptr;
+  }
   const Replica& replicaOf(int frame) const { return *replicas_[frames_[frame].replica]; }
   const Replica& replicaAt(int replica) const { return *replicas_[replica]; }
   const ClothModel& model() const { return *model_; }

@@ -155,6 +155,53 @@ TEST(ClothKindFramesTest, ClipPoseErrorWidensStiffDirectionsOnly) {
   EXPECT_NEAR(pose, force / 0.0015, 0.3 * force / 0.0015);
 }
 
+/// A ripple that no law of the model follows, of 0.3 mm where the noise is said to be 0.05 mm.
+TEST(ClothKindFramesTest, WhatTheLawCannotFollowIsWeighedBesideTheNoise) {
+  const ClothModel& model = modelNamed("stvk");
+  const ParameterSet truth = clothParameters(model);
+  constexpr double kRipple_m = 3e-4;
+  Measurement m = syntheticCloth("bend-weft", truth, smallReplica());
+  for (MeasurementFrame& frame : m.frames)
+    frame.positions.row(2) += kRipple_m * (300.0 * m.rest->uv.row(1)).array().sin().matrix();
+  auto test = make(m, model, smallReplica());
+  test->setParameters(truth);
+  const auto misfit = [&] {
+    double sum = 0.0;
+    int count = test->constantCount();
+    for (int f = 0; f < test->frameCount(); ++f) {
+      Eigen::VectorXd r;
+      EXPECT_TRUE(test->evaluate(f, r, nullptr).converged);
+      sum += r.squaredNorm();
+      count += static_cast<int>(r.size());
+    }
+    return (sum + test->constantCost()) / count;
+  };
+  EXPECT_GT(misfit(), 5.0);
+  EXPECT_FALSE(test->updateDiscrepancy()) << "nothing is accepted yet";
+  test->accept();
+  EXPECT_TRUE(test->updateDiscrepancy());
+  EXPECT_NEAR(test->discrepancy_m(), kRipple_m / std::sqrt(6.0), 0.1 * kRipple_m / std::sqrt(6.0));
+  EXPECT_NEAR(misfit(), 1.0, 0.05);
+  EXPECT_FALSE(test->updateDiscrepancy()) << "the same states say the same";
+}
+
+TEST(ClothKindFramesTest, NoiseIsNoDiscrepancy) {
+  const ClothModel& model = modelNamed("stvk");
+  const ParameterSet truth = clothParameters(model);
+  Measurement m = syntheticCloth("bend-weft", truth, smallReplica());
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 5e-5);
+  for (MeasurementFrame& frame : m.frames)
+    for (double& x : frame.positions.reshaped()) x += noise(random);
+  auto test = make(m, model, smallReplica());
+  test->setParameters(truth);
+  Eigen::VectorXd r;
+  for (int f = 0; f < test->frameCount(); ++f) test->evaluate(f, r, nullptr);
+  test->accept();
+  EXPECT_FALSE(test->updateDiscrepancy());
+  EXPECT_EQ(test->discrepancy_m(), 0.0);
+}
+
 TEST(ClothKindFramesTest, BadMeasurementsAreRefused) {
   const ClothModel& model = modelNamed("stvk");
   const ParameterSet truth = clothParameters(model);

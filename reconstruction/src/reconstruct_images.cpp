@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "calibration_error.h"
+
 namespace tenter {
 
 namespace {
@@ -73,8 +75,12 @@ MeasurementFrame measuredFrame(const ClothFrame& cloth, std::int64_t time_ns) {
   frame.time_ns = time_ns;
   frame.positions = cloth.positions_m;
   frame.position_sigma_m.resize(cloth.positions_m.cols());
+  frame.position_sigma_axes_m.resize(3, cloth.positions_m.cols());
   for (std::size_t i = 0; i < cloth.states.size(); ++i) {
-    frame.position_sigma_m(static_cast<Eigen::Index>(i)) = sigmaOf(cloth.covariances_m2[i]);
+    const auto column = static_cast<Eigen::Index>(i);
+    frame.position_sigma_m(column) = sigmaOf(cloth.covariances_m2[i]);
+    frame.position_sigma_axes_m.col(column) =
+        cloth.covariances_m2[i].diagonal().cwiseMax(0.0).cwiseSqrt();
     frame.valid.push_back(static_cast<std::uint8_t>(cloth.states[i] == PointState::kValid));
   }
   return frame;
@@ -137,6 +143,12 @@ Result<SeriesResult> reconstructImages(const std::vector<CameraView>& views,
   auto rest = findSurface(views, *images, surface_options, options.inside);
   if (!rest) return rest.error();
   result.rest = std::move(*rest);
+  if (options.calibration) {
+    if (const auto error = CalibrationError::create(*options.calibration, views))
+      addCalibrationError(*error, result.rest);
+    else
+      result.warnings.emplace_back(kExactCalibration);
+  }
   result.warnings.insert(result.warnings.end(), result.rest.warnings.begin(),
                          result.rest.warnings.end());
   result.measurement = emptyMeasurement(result.rest);

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <sstream>
 
+#include "calibration_error.h"
 #include "partial_store.h"
 #include "rig_reader.h"
 #include "subset_centres.h"
@@ -26,7 +27,7 @@ std::size_t imagesIn(const std::vector<GrayImage>& images) {
 
 /// What finished frames depend on.
 /// Goes up when frames come out otherwise than before: what an older program kept is done again.
-constexpr int kMethod = 2;
+constexpr int kMethod = 3;
 
 std::string identityOf(const ImageSession& session, const SessionReconstruction& o) {
   const CorrelateOptions& c = o.surface.correlate;
@@ -116,6 +117,10 @@ class SessionRun {
       return error;
     }
     result_.rest = std::move(*rest);
+    if (const auto error = CalibrationError::create(s_.calibration, s_.views))
+      addCalibrationError(*error, result_.rest);
+    else
+      result_.warnings.emplace_back(kExactCalibration);
     result_.warnings.insert(result_.warnings.end(), result_.rest.warnings.begin(),
                             result_.rest.warnings.end());
     RestSurface followed = result_.rest;

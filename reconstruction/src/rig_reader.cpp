@@ -82,7 +82,8 @@ void RigReader::hold(const MountedClip& clip, const ClipPose& pose, Reading& rea
     const double sigma =
         std::hypot(pose.position_sigma_m, pose.rotation_sigma_rad * (rest - middle).norm());
     const Mat3 own = rest_.vertices[vertex].state == PointState::kValid
-                         ? rest_.vertices[vertex].point.covariance_m2
+                         ? Mat3(rest_.vertices[vertex].point.covariance_m2 +
+                                rest_.vertices[vertex].calibration_m2)
                          : Mat3(Mat3::Zero());
     reading.held.push_back(
         {vertex, pose.rig_from_clip * rest, sigma * sigma * Mat3::Identity() + own});

@@ -57,6 +57,8 @@ def read_measurement(folder):
         if "mesh" in frame:
             frame["points"], _, data = read_vtp(folder / frame["mesh"])
             frame["sigma_m"], frame["valid"] = data["sigma_m"], data["valid"] != 0
+            if "sigma_axes_m" in data:
+                frame["sigma_axes_m"] = data["sigma_axes_m"]
     return measurement
 
 

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tenter/calib/board.h"
@@ -12,6 +13,9 @@
 namespace tenter {
 
 inline constexpr int kCalibrationSchemaVersion = 1;
+/// Name of the rig's pose among a covariance's parameters: world_from_rig = [exp(rotation) R | t +
+/// translation].
+inline constexpr std::string_view kRigPose = "rig";
 
 /// An image that a calibration did not use, and why.
 struct RejectedImage {
@@ -78,7 +82,7 @@ struct CameraCalibration {
   std::optional<RigFrame> rig;
 
   /// Joint covariance, symmetric, and the name of each row: "left.fx_px", "right.rotation_rad[0]",
-  /// "board.warp_m[1]". Empty if not known.
+  /// "board.warp_m[1]", "rig.rotation_rad[2]". Empty if not known.
   std::vector<std::string> parameters;
   Eigen::MatrixXd covariance;
 

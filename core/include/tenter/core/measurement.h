@@ -46,6 +46,7 @@ struct MeasurementFrame {
   std::vector<CordReading> cords;    ///< Cloth captures.
   Points3 positions;  ///< Cloth captures: 3 x n tracked vertices [m]; 3 x 0 if the frame has none.
   Eigen::VectorXd position_sigma_m;  ///< n standard deviations per axis [m].
+  Points3 position_sigma_axes_m;     ///< 3 x n, of x, y and z apart; 3 x 0 if they are not known.
   std::vector<std::uint8_t> valid;   ///< n; 0 where a vertex was not seen.
   double displacement_m = 0.0;       ///< Tensile: travel of the moving clamp.
   double force_N = 0.0;              ///< Tensile: total force over all strips.

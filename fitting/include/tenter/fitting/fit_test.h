@@ -112,6 +112,13 @@ class FitTest {
   /// clip-pose error, anew from the next solved state of every frame, and keeps the warm starts.
   /// Otherwise they stay as of the first solved state, or of restart().
   virtual void reweigh() {}
+  /// Estimates anew, from the states accepted last, by how much the law misses what was measured
+  /// beyond its noise, and weighs residuals by both. Returns whether weights changed; then they are
+  /// those of reweigh() too.
+  virtual bool updateDiscrepancy() { return false; }
+  /// That estimate: standard deviation per axis of what the law cannot follow at tracked vertices
+  /// [m]; 0 where noise explains the misfit.
+  virtual double discrepancy_m() const { return 0.0; }
   /// Whether evaluate() proves each state stable with factors of its own (the default), or lets
   /// those of a near state stand in, which halves their number, also in derivatives: for the way,
   /// not for the end.

@@ -30,6 +30,8 @@ struct RestVertex {
   SpacePoint point;                       ///< If valid.
   std::vector<VertexSighting> sightings;  ///< The views that show it; at least two if valid.
   double zncc = 0.0;                      ///< Least of those between views.
+  /// What the calibration errs by here, alike in all frames; zero if it is not known.
+  Mat3 calibration_m2 = Mat3::Zero();
 };
 
 /// The surface at rest and what is needed to follow it.

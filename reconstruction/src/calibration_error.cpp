@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "calibration_error.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <string>
+
+namespace tenter {
+
+namespace {
+
+constexpr std::array<const char*, 9> kLensNames{"fx_px", "fy_px", "cx_px", "cy_px", "k1",
+                                                "k2",    "p1",    "p2",    "k3"};
+/// Of a term's standard deviation, for central differences.
+constexpr double kStep = 0.1;
+
+double& lensTerm(Lens& lens, int term) {
+  switch (term) {
+    case 0:
+      return lens.fx_px;
+    case 1:
+      return lens.fy_px;
+    case 2:
+      return lens.cx_px;
+    case 3:
+      return lens.cy_px;
+    default:
+      return lens.distortion[static_cast<std::size_t>(term - 4)];
+  }
+}
+
+Mat3 cross(const Vec3& v) {
+  Mat3 m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+Eigen::Index rowOf(const std::vector<std::string>& names, const std::string& name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  return found == names.end() ? -1 : static_cast<Eigen::Index>(found - names.begin());
+}
+
+}  // namespace
+
+std::optional<CalibrationError> CalibrationError::create(const CameraCalibration& calibration,
+                                                         const std::vector<CameraView>& views) {
+  const auto size = static_cast<Eigen::Index>(calibration.parameters.size());
+  if (size == 0 || calibration.covariance.rows() != size) return std::nullopt;
+  CalibrationError error;
+  error.covariance_ = calibration.covariance;
+  for (const CameraView& view : views) {
+    const CalibratedCamera* camera = calibration.find(view.name);
+    if (camera == nullptr) return std::nullopt;
+    View out{view, camera->camera_from_world, 0, -1, {}, {}, {}};
+    out.lens = rowOf(calibration.parameters, view.name + "." + kLensNames[0]);
+    if (out.lens < 0 || out.lens + kLensTerms > size) return std::nullopt;
+    if (camera != &calibration.cameras.front()) {
+      out.pose = rowOf(calibration.parameters, view.name + ".rotation_rad[0]");
+      if (out.pose < 0 || out.pose + 6 > size) return std::nullopt;
+    }
+    for (int term = 0; term < kLensTerms; ++term) {
+      const double sigma = std::sqrt(calibration.covariance(out.lens + term, out.lens + term));
+      const double step = kStep * sigma;
+      Lens up = camera->model.lens(), down = up;
+      lensTerm(up, term) += step;
+      lensTerm(down, term) -= step;
+      const auto more = CameraModel::make(camera->model.widthPx(), camera->model.heightPx(), up);
+      const auto less = CameraModel::make(camera->model.widthPx(), camera->model.heightPx(), down);
+      if (!more || !less) return std::nullopt;
+      out.more.push_back(*more);
+      out.less.push_back(*less);
+      out.step.push_back(step);
+    }
+    error.views_.push_back(std::move(out));
+  }
+  if (calibration.rig) {
+    error.world_from_rig_ = calibration.rig->rig_from_world.inverse();
+    // The last of that name: a camera may be called so too.
+    const std::string first = std::string(kRigPose) + ".rotation_rad[0]";
+    if (size >= 6 && calibration.parameters[static_cast<std::size_t>(size - 6)] == first)
+      error.rig_ = size - 6;
+  }
+  return error;
+}
+
+bool CalibrationError::pixelByParameters(const View& view, const Vec3& point_m,
+                                         PixelRows& rows) const {
+  rows.setZero(2, covariance_.rows());
+  const Vec3 world = world_from_rig_ ? *world_from_rig_ * point_m : point_m;
+  const Vec3 local = view.camera_from_world * world;
+  Eigen::Matrix<double, 2, 3> jacobian;
+  if (!view.view.model.project(local, &jacobian)) return false;
+  for (int term = 0; term < kLensTerms; ++term) {
+    const auto at = static_cast<std::size_t>(term);
+    if (view.step[at] == 0.0) continue;
+    const auto more = view.more[at].project(local), less = view.less[at].project(local);
+    if (!more || !less) return false;
+    rows.col(view.lens + term) = (*more - *less) / (2.0 * view.step[at]);
+  }
+  const Mat3 turn = view.camera_from_world.linear();
+  if (view.pose >= 0) {
+    rows.middleCols<3>(view.pose) = -jacobian * cross(turn * world);
+    rows.middleCols<3>(view.pose + 3) = jacobian;
+  }
+  if (rig_ >= 0) {
+    const Vec3 arm = world - world_from_rig_->translation();
+    rows.middleCols<3>(rig_) = -jacobian * turn * cross(arm);
+    rows.middleCols<3>(rig_ + 3) = jacobian * turn;
+  }
+  return true;
+}
+
+Mat3 CalibrationError::covarianceAt(const Vec3& point_m,
+                                    std::span<const VertexSighting> sightings) const {
+  Mat3 normal = Mat3::Zero();
+  Eigen::Matrix<double, 3, Eigen::Dynamic> right(3, covariance_.rows());
+  right.setZero();
+  PixelRows rows;
+  for (const VertexSighting& seen : sightings) {
+    const View& view = views_[static_cast<std::size_t>(seen.sighting.view)];
+    Eigen::Matrix<double, 2, 3> jacobian;
+    if (!view.view.project(point_m, &jacobian) || !pixelByParameters(view, point_m, rows))
+      return Mat3::Zero();
+    const Eigen::Matrix<double, 3, 2> weighted =
+        jacobian.transpose() * seen.sighting.covariance_px2.inverse();
+    normal += weighted * jacobian;
+    right.noalias() += weighted * rows;
+  }
+  const Eigen::LDLT<Mat3> factor(normal);
+  if (sightings.size() < 2 || !factor.isPositive()) return Mat3::Zero();
+  const Eigen::Matrix<double, 3, Eigen::Dynamic> by_parameters = factor.solve(right);
+  return by_parameters * covariance_ * by_parameters.transpose();
+}
+
+void addCalibrationError(const CalibrationError& error, RestSurface& surface) {
+  for (RestVertex& vertex : surface.vertices)
+    if (vertex.state == PointState::kValid)
+      vertex.calibration_m2 = error.covarianceAt(vertex.point.position_m, vertex.sightings);
+}
+
+}  // namespace tenter
