@@ -69,13 +69,23 @@ std::vector<TestInformation> gather(const FrameEvaluator& evaluator,
   return tests;
 }
 
+/// 97.5 % quantile of Student's t over that of the normal distribution (the first terms in 1 /
+/// freedom): what a variance from few runs falls short of, so that 1.96 of its root still hold 95
+/// %.
+double fewRunsFactor(double freedom) {
+  constexpr double kNormal = 1.96, kFirst = 2.37, kSecond = 2.82;
+  return (kNormal + kFirst / freedom + kSecond / (freedom * freedom)) / kNormal;
+}
+
 /// What runs of frames disagree about: the middle of the sandwich for clustered errors [LZ86]. A
 /// run draws the optimum towards itself, the more the more it says: in coordinates where all tests'
-/// information is the identity, dividing by I - (its own information) undoes that [BM02].
+/// information is the identity, dividing by the root of I - (its own information) undoes that
+/// [BM02].
 Eigen::MatrixXd disagreement(const TestInformation& test, const Eigen::MatrixXd& information) {
   const Eigen::LLT<Eigen::MatrixXd> factor(information);
   const auto n = information.rows();
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(n, n);
+  if (test.runs.size() < 2) return sum;
   for (const TestInformation::Run& run : test.runs) {
     const Eigen::MatrixXd own = test.own.asDiagonal() * run.normal * test.own.asDiagonal();
     const Eigen::MatrixXd half = factor.matrixL().solve(own);
@@ -86,10 +96,11 @@ Eigen::MatrixXd disagreement(const TestInformation& test, const Eigen::MatrixXd&
     const Eigen::VectorXd seen =
         share.eigenvectors().transpose() * factor.matrixL().solve(gradient);
     const Eigen::VectorXd undone =
-        factor.matrixL() * (share.eigenvectors() * seen.cwiseQuotient(left));
+        factor.matrixL() * (share.eigenvectors() * seen.cwiseQuotient(left.cwiseSqrt()));
     sum += undone * undone.transpose();
   }
-  return sum;
+  const double widened = fewRunsFactor(static_cast<double>(test.runs.size() - 1));
+  return widened * widened * sum;
 }
 
 std::vector<bool> entriesAtBound(const FitSpace& space, const Eigen::VectorXd& z) {

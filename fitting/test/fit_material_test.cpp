@@ -232,7 +232,9 @@ TEST(FitMaterial, BandsHoldErrorsThatNeighbouringFramesShare) {
   world.frames_sharing_an_error = 4;
   const auto [covered, pairs] = coverageOf(world);
   ASSERT_GT(pairs, 200);
-  EXPECT_GE(covered, 0.90 * pairs) << covered << " of " << pairs;
+  // Ten runs that share four coefficients leave a little short of 95 %; counted as independent the
+  // forty frames would hold six of ten.
+  EXPECT_GE(covered, 0.87 * pairs) << covered << " of " << pairs;
 }
 
 TEST(FitMaterial, IsotropicVariantSharesOneCurve) {

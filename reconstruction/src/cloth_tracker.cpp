@@ -112,7 +112,9 @@ void ClothTracker::State::locate(int vertex, std::vector<Sighting>& seen,
     }
     if (worst == seen.size()) {
       frame.positions_m.col(vertex) = point->position_m;
-      frame.covariances_m2[vertex] = point->covariance_m2 + surface.vertices[vertex].calibration_m2;
+      frame.covariances_m2[vertex] = point->covariance_m2;
+      if (surface.systematic)
+        frame.covariances_m2[vertex] += surface.systematic->covarianceAt(point->position_m, seen);
       frame.residual_px[vertex] = static_cast<float>(point->residual_px);
       frame.views[vertex] = static_cast<std::uint8_t>(seen.size());
       frame.states[vertex] = PointState::kValid;
@@ -215,13 +217,15 @@ std::size_t ClothFrame::validCount() const {
 ClothFrame restFrame(const RestSurface& surface) {
   ClothFrame frame;
   frame.positions_m = surface.mesh.positions;
-  for (const RestVertex& vertex : surface.vertices) {
+  for (int i = 0; i < static_cast<int>(surface.vertices.size()); ++i) {
+    const RestVertex& vertex = surface.vertices[i];
     const bool valid = vertex.state == PointState::kValid;
     // A filled vertex may err by several pixels.
     constexpr double kFilledError_px = 5.0;
     const double guess = kFilledError_px * surface.pixel_m;
-    frame.covariances_m2.push_back(valid ? Mat3(vertex.point.covariance_m2 + vertex.calibration_m2)
-                                         : Mat3(guess * guess * Mat3::Identity()));
+    frame.covariances_m2.push_back(
+        valid ? Mat3(vertex.point.covariance_m2 + surface.systematicAt(i, vertex.point.position_m))
+              : Mat3(guess * guess * Mat3::Identity()));
     frame.states.push_back(vertex.state);
     frame.views.push_back(static_cast<std::uint8_t>(valid ? vertex.sightings.size() : 0));
     frame.zncc.push_back(static_cast<float>(vertex.zncc));

@@ -5,8 +5,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "calibration_error.h"
-
 namespace tenter {
 
 namespace {
@@ -143,12 +141,7 @@ Result<SeriesResult> reconstructImages(const std::vector<CameraView>& views,
   auto rest = findSurface(views, *images, surface_options, options.inside);
   if (!rest) return rest.error();
   result.rest = std::move(*rest);
-  if (options.calibration) {
-    if (const auto error = CalibrationError::create(*options.calibration, views))
-      addCalibrationError(*error, result.rest);
-    else
-      result.warnings.emplace_back(kExactCalibration);
-  }
+  addSystematicError(options.calibration, views, result.rest);
   result.warnings.insert(result.warnings.end(), result.rest.warnings.begin(),
                          result.rest.warnings.end());
   result.measurement = emptyMeasurement(result.rest);

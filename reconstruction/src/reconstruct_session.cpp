@@ -5,7 +5,6 @@
 #include <chrono>
 #include <sstream>
 
-#include "calibration_error.h"
 #include "partial_store.h"
 #include "rig_reader.h"
 #include "subset_centres.h"
@@ -117,10 +116,7 @@ class SessionRun {
       return error;
     }
     result_.rest = std::move(*rest);
-    if (const auto error = CalibrationError::create(s_.calibration, s_.views))
-      addCalibrationError(*error, result_.rest);
-    else
-      result_.warnings.emplace_back(kExactCalibration);
+    addSystematicError(&s_.calibration, s_.views, result_.rest);
     result_.warnings.insert(result_.warnings.end(), result_.rest.warnings.begin(),
                             result_.rest.warnings.end());
     RestSurface followed = result_.rest;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "coarse_surface.h"
 #include "grid_mesh.h"
@@ -11,6 +12,7 @@
 #include "subset_centres.h"
 #include "surface_warp.h"
 #include "view_matcher.h"
+#include "view_offsets.h"
 
 namespace tenter {
 
@@ -113,12 +115,14 @@ Result<void> checkRepeats(const SheetGrid& grid, const SheetHeights& heights,
                   "print a texture without period, such as that of tenter pattern texture");
 }
 
-void judgeResiduals(RestSurface& surface) {
+void judgeResiduals(const std::vector<CameraView>& views, RestSurface& surface) {
+  const ViewOffsets offsets(views, surface.vertices);
+  surface.offset_px = offsets.offset_px();
   std::vector<double> residuals, ratios;
   for (const RestVertex& vertex : surface.vertices) {
     if (vertex.state != PointState::kValid) continue;
     residuals.push_back(vertex.point.residual_px);
-    ratios.push_back(vertex.point.chi2 /
+    ratios.push_back(offsets.chi2(vertex) /
                      shareOf(2 * static_cast<int>(vertex.sightings.size()) - 3));
   }
   surface.residual_px = medianOf(residuals);
@@ -157,7 +161,7 @@ Result<RestSurface> surfaceOn(const std::vector<CameraView>& views,
   auto surface = meshOnGrid(grid, heights, std::move(vertices));
   if (!surface) return surface;
   surface->pixel_m = pixel_m;
-  judgeResiduals(*surface);
+  judgeResiduals(views, *surface);
   if (surface->validCount() >= kLeastVertices) return surface;
   return badInput(
       "", "",
@@ -171,6 +175,31 @@ std::size_t RestSurface::validCount() const {
   return static_cast<std::size_t>(
       std::count_if(vertices.begin(), vertices.end(),
                     [](const RestVertex& vertex) { return vertex.state == PointState::kValid; }));
+}
+
+Mat3 RestSurface::systematicAt(int vertex, const Vec3& position_m) const {
+  if (!systematic) return Mat3::Zero();
+  std::vector<Sighting> seen;
+  for (const VertexSighting& s : vertices[vertex].sightings) seen.push_back(s.sighting);
+  return systematic->covarianceAt(position_m, seen);
+}
+
+void addSystematicError(const CameraCalibration* calibration, const std::vector<CameraView>& views,
+                        RestSurface& surface) {
+  if (calibration != nullptr) {
+    if (auto stated = SystematicError::ofCalibration(*calibration, views)) {
+      surface.systematic = std::make_shared<const SystematicError>(std::move(*stated));
+      return;
+    }
+  }
+  surface.systematic =
+      std::make_shared<const SystematicError>(SystematicError::ofOffsets(views, surface.offset_px));
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the calibration does not state its covariance: sigma goes by how far the views "
+                "disagree, %.3f px",
+                surface.offset_px);
+  surface.warnings.emplace_back(text);
 }
 
 Result<RestSurface> findSurface(const std::vector<CameraView>& views,

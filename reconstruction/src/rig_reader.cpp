@@ -19,8 +19,10 @@ constexpr double kStill_m = 1e-6;
 constexpr double kWellOnTable_m = 3e-3;
 /// A line of the mesh that lies on the edge is held.
 constexpr double kOnEdge_m = 0.05e-3;
-/// How much of a pixel the table's place may err by.
+/// Fewer vertices do not tell where it lies.
 constexpr std::size_t kLeastOnTable = 20;
+/// Standard deviation of a normal distribution over its median absolute deviation.
+constexpr double kSigmaOfMedianDeviation = 1.4826;
 
 std::vector<MountedClip> taggedClips(const Mounting& mounting) {
   std::vector<MountedClip> tagged;
@@ -83,7 +85,7 @@ void RigReader::hold(const MountedClip& clip, const ClipPose& pose, Reading& rea
         std::hypot(pose.position_sigma_m, pose.rotation_sigma_rad * (rest - middle).norm());
     const Mat3 own = rest_.vertices[vertex].state == PointState::kValid
                          ? Mat3(rest_.vertices[vertex].point.covariance_m2 +
-                                rest_.vertices[vertex].calibration_m2)
+                                rest_.systematicAt(vertex, pose.rig_from_clip * rest))
                          : Mat3(Mat3::Zero());
     reading.held.push_back(
         {vertex, pose.rig_from_clip * rest, sigma * sigma * Mat3::Identity() + own});
@@ -143,7 +145,7 @@ Result<RigReader::Reading> RigReader::read(const std::vector<GrayImage>& images,
   return reading;
 }
 
-void RigReader::addTable(const ClothFrame& cloth, Reading& reading) const {
+void RigReader::addTable(ClothFrame& cloth, Reading& reading) const {
   if (!session_.mounting.table) return;
   const MountedTable& table = *session_.mounting.table;
   const double edge = table.push.dot(table.edge_m);
@@ -158,13 +160,26 @@ void RigReader::addTable(const ClothFrame& cloth, Reading& reading) const {
     reading.warnings.push_back("the cloth on the table was not seen: the table is left out");
     return;
   }
-  const double push = median(std::move(moved));
+  const double push = median(moved);
+  for (double& value : moved) value = std::abs(value - push);
+  const double scatter = kSigmaOfMedianDeviation * median(std::move(moved));
   ClipReading clip;
   clip.clip = table.clip;
   clip.rig_from_clip.translation() = push * table.push;
   for (int i = 0; i < rest_.mesh.vertexCount(); ++i) {
     const double along = table.push.dot(rest_.mesh.positions.col(i)) + push;
-    if (along <= edge + kOnEdge_m) clip.clamped_vertices.push_back(i);
+    if (along > edge + kOnEdge_m) continue;
+    clip.clamped_vertices.push_back(i);
+    if (cloth.states[i] == PointState::kValid) continue;
+    // Hidden or beyond an image: it lies on the table as it did, pushed with the rest.
+    const Vec3 at = rest_.mesh.positions.col(i) + push * table.push;
+    cloth.positions_m.col(i) = at;
+    const Mat3 own = rest_.vertices[i].state == PointState::kValid
+                         ? rest_.vertices[i].point.covariance_m2
+                         : Mat3(Mat3::Zero());
+    cloth.covariances_m2[i] =
+        scatter * scatter * Mat3::Identity() + own + rest_.systematicAt(i, at);
+    cloth.states[i] = PointState::kValid;
   }
   // The sample's outline in its plane, cut at the edge, then in material coordinates.
   const Mounting& m = session_.mounting;

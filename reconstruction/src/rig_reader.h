@@ -29,7 +29,7 @@ class RigReader {
   Result<Reading> read(const std::vector<GrayImage>& images, const SessionMoment& moment);
 
   /// Adds the table, by where the cloth on it was seen to lie.
-  void addTable(const ClothFrame& cloth, Reading& reading) const;
+  void addTable(ClothFrame& cloth, Reading& reading) const;
 
   /// Whether cords are drawn in or let out between two moments; on a table, always loading.
   Branch branchBetween(const SessionMoment* before, const SessionMoment& now) const;

@@ -42,14 +42,10 @@ struct VertexMaps {
   void add(const ClothFrame& cloth);
 };
 
-/// The warning that sigma lacks a part.
-inline constexpr const char* kExactCalibration =
-    "the calibration does not state its covariance: sigma is that of matching alone";
-
 /// Images to follow cloth through, and how.
 struct SeriesOptions {
   SurfaceOptions surface;
-  /// Where the views come from; its covariance becomes part of sigma. Null: taken as exact.
+  /// Where the views come from; its covariance becomes part of sigma.
   const CameraCalibration* calibration = nullptr;
   /// Pixels of the first view's first image that count; empty: all.
   std::function<bool(const Vec2&)> inside;

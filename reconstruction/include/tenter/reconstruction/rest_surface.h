@@ -2,12 +2,13 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "tenter/core/mesh.h"
 #include "tenter/reconstruction/correlate.h"
-#include "tenter/reconstruction/triangulate.h"
+#include "tenter/reconstruction/systematic_error.h"
 
 namespace tenter {
 
@@ -30,8 +31,6 @@ struct RestVertex {
   SpacePoint point;                       ///< If valid.
   std::vector<VertexSighting> sightings;  ///< The views that show it; at least two if valid.
   double zncc = 0.0;                      ///< Least of those between views.
-  /// What the calibration errs by here, alike in all frames; zero if it is not known.
-  Mat3 calibration_m2 = Mat3::Zero();
 };
 
 /// The surface at rest and what is needed to follow it.
@@ -42,11 +41,23 @@ struct RestSurface {
   std::vector<int> node_of_vertex;
   double pixel_m = 0.0;      ///< What a pixel covers, the median.
   double residual_px = 0.0;  ///< Median over valid vertices.
-  double inflation = 1.0;    ///< What sightings' sigmas fall short of their residuals, at least 1.
+  /// What sightings' sigmas fall short of their residuals, at least 1, where each view's offset
+  /// that varies linearly over its image is left out ...
+  double inflation = 1.0;
+  double offset_px = 0.0;  ///< ... and its standard deviation per axis: calibrations err.
+  /// What is added to a place's covariance for that; null: nothing.
+  std::shared_ptr<const SystematicError> systematic;
   std::vector<std::string> warnings;
 
   std::size_t validCount() const;
+  /// Systematic part at a vertex, as it is seen at rest; zero where nothing is known.
+  Mat3 systematicAt(int vertex, const Vec3& position_m) const;
 };
+
+/// By the calibration's covariance, or where it states none (or none is given) by how far views
+/// disagree; says so in the surface's warnings.
+void addSystematicError(const CameraCalibration* calibration, const std::vector<CameraView>& views,
+                        RestSurface& surface);
 
 /// The part of a sheet to be meshed: nodes origin + (i, j) spacing in the sheet's plane.
 struct SheetGrid {

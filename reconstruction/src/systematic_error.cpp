@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "calibration_error.h"
+#include "tenter/reconstruction/systematic_error.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -44,16 +44,17 @@ Eigen::Index rowOf(const std::vector<std::string>& names, const std::string& nam
 
 }  // namespace
 
-std::optional<CalibrationError> CalibrationError::create(const CameraCalibration& calibration,
-                                                         const std::vector<CameraView>& views) {
+std::optional<SystematicError> SystematicError::ofCalibration(
+    const CameraCalibration& calibration, const std::vector<CameraView>& views) {
   const auto size = static_cast<Eigen::Index>(calibration.parameters.size());
   if (size == 0 || calibration.covariance.rows() != size) return std::nullopt;
-  CalibrationError error;
+  SystematicError error;
   error.covariance_ = calibration.covariance;
   for (const CameraView& view : views) {
     const CalibratedCamera* camera = calibration.find(view.name);
     if (camera == nullptr) return std::nullopt;
-    View out{view, camera->camera_from_world, 0, -1, {}, {}, {}};
+    View out(view);
+    out.camera_from_world = camera->camera_from_world;
     out.lens = rowOf(calibration.parameters, view.name + "." + kLensNames[0]);
     if (out.lens < 0 || out.lens + kLensTerms > size) return std::nullopt;
     if (camera != &calibration.cameras.front()) {
@@ -85,9 +86,23 @@ std::optional<CalibrationError> CalibrationError::create(const CameraCalibration
   return error;
 }
 
-bool CalibrationError::pixelByParameters(const View& view, const Vec3& point_m,
-                                         PixelRows& rows) const {
+SystematicError SystematicError::ofOffsets(const std::vector<CameraView>& views, double offset_px) {
+  SystematicError error;
+  const auto size = static_cast<Eigen::Index>(2 * views.size());
+  error.covariance_ = offset_px * offset_px * Eigen::MatrixXd::Identity(size, size);
+  for (const CameraView& view : views) {
+    View out(view);
+    out.offset = static_cast<Eigen::Index>(2 * error.views_.size());
+    error.views_.push_back(std::move(out));
+  }
+  return error;
+}
+
+bool SystematicError::pixelByParameters(const View& view, const Vec3& point_m,
+                                        PixelRows& rows) const {
   rows.setZero(2, covariance_.rows());
+  if (view.offset >= 0) rows.middleCols<2>(view.offset).setIdentity();
+  if (view.lens < 0) return true;
   const Vec3 world = world_from_rig_ ? *world_from_rig_ * point_m : point_m;
   const Vec3 local = view.camera_from_world * world;
   Eigen::Matrix<double, 2, 3> jacobian;
@@ -112,19 +127,18 @@ bool CalibrationError::pixelByParameters(const View& view, const Vec3& point_m,
   return true;
 }
 
-Mat3 CalibrationError::covarianceAt(const Vec3& point_m,
-                                    std::span<const VertexSighting> sightings) const {
+Mat3 SystematicError::covarianceAt(const Vec3& point_m, std::span<const Sighting> sightings) const {
   Mat3 normal = Mat3::Zero();
   Eigen::Matrix<double, 3, Eigen::Dynamic> right(3, covariance_.rows());
   right.setZero();
   PixelRows rows;
-  for (const VertexSighting& seen : sightings) {
-    const View& view = views_[static_cast<std::size_t>(seen.sighting.view)];
+  for (const Sighting& seen : sightings) {
+    const View& view = views_[static_cast<std::size_t>(seen.view)];
     Eigen::Matrix<double, 2, 3> jacobian;
     if (!view.view.project(point_m, &jacobian) || !pixelByParameters(view, point_m, rows))
       return Mat3::Zero();
     const Eigen::Matrix<double, 3, 2> weighted =
-        jacobian.transpose() * seen.sighting.covariance_px2.inverse();
+        jacobian.transpose() * seen.covariance_px2.inverse();
     normal += weighted * jacobian;
     right.noalias() += weighted * rows;
   }
@@ -132,12 +146,6 @@ Mat3 CalibrationError::covarianceAt(const Vec3& point_m,
   if (sightings.size() < 2 || !factor.isPositive()) return Mat3::Zero();
   const Eigen::Matrix<double, 3, Eigen::Dynamic> by_parameters = factor.solve(right);
   return by_parameters * covariance_ * by_parameters.transpose();
-}
-
-void addCalibrationError(const CalibrationError& error, RestSurface& surface) {
-  for (RestVertex& vertex : surface.vertices)
-    if (vertex.state == PointState::kValid)
-      vertex.calibration_m2 = error.covarianceAt(vertex.point.position_m, vertex.sightings);
 }
 
 }  // namespace tenter

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a calibration errs by, against triangulations with a calibration that errs.
-#include "calibration_error.h"
+#include "tenter/reconstruction/systematic_error.h"
 
 #include <gtest/gtest.h>
 
@@ -83,11 +83,10 @@ CameraCalibration erring(const CameraCalibration& c, Eigen::Index parameter, dou
   return out;
 }
 
-TEST(CalibrationErrorTest, IsWhatATriangulationWithAnErringCalibrationMissesBy) {
+TEST(SystematicErrorTest, IsWhatATriangulationWithAnErringCalibrationMissesBy) {
   const CameraCalibration exact = calibration();
   const std::vector<CameraView> views = viewsOf(exact);
   const Vec3 point = exact.rig->rig_from_world * Vec3(0.03, -0.02, 0.53);
-  std::vector<VertexSighting> sightings;
   std::vector<Sighting> seen;
   for (int v = 0; v < 3; ++v) {
     const auto pixel = views[v].project(point);
@@ -95,29 +94,28 @@ TEST(CalibrationErrorTest, IsWhatATriangulationWithAnErringCalibrationMissesBy) 
     Mat2 covariance;
     covariance << 0.01 * (v + 1), 0.002, 0.002, 0.02;
     seen.push_back({v, *pixel, covariance});
-    sightings.push_back({seen.back(), *pixel});
   }
   for (Eigen::Index p = 0; p < exact.covariance.rows(); ++p) {
     // Lens terms of the order of a pixel, poses of 0.1 mrad and 0.1 mm.
     const double sigma = exact.parameters[p].ends_with("_px") ? 0.3 : 1e-4;
     CameraCalibration known = exact;
     known.covariance(p, p) = sigma * sigma;
-    const auto error = CalibrationError::create(known, views);
+    const auto error = SystematicError::ofCalibration(known, views);
     ASSERT_TRUE(error);
     const auto found = triangulate(viewsOf(erring(exact, p, sigma)), seen);
     ASSERT_TRUE(found);
     const Vec3 missed = found->position_m - point;
     const Mat3 expected = missed * missed.transpose();
-    EXPECT_LT((error->covarianceAt(point, sightings) - expected).norm(), 0.02 * expected.norm())
+    EXPECT_LT((error->covarianceAt(point, seen) - expected).norm(), 0.02 * expected.norm())
         << exact.parameters[p];
   }
 }
 
-TEST(CalibrationErrorTest, IsNotKnownWithoutACovariance) {
+TEST(SystematicErrorTest, IsNotKnownWithoutACovariance) {
   CameraCalibration c = calibration();
   c.parameters.clear();
   c.covariance.resize(0, 0);
-  EXPECT_FALSE(CalibrationError::create(c, viewsOf(c)));
+  EXPECT_FALSE(SystematicError::ofCalibration(c, viewsOf(c)));
 }
 
 }  // namespace
