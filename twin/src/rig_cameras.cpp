@@ -6,6 +6,7 @@
 
 #include "random_numbers.h"
 #include "rig_setup.h"
+#include "stated_covariance.h"
 #include "tenter/twin/protocol.h"
 
 namespace tenter {
@@ -172,6 +173,7 @@ CameraCalibration calibrationOf(const std::vector<VirtualCamera>& cameras, const
   CameraCalibration out;
   out.source = "tenter twin";
   Eigen::Isometry3d rig_from_world = Eigen::Isometry3d::Identity();
+  std::vector<StatedError> stated;
   for (const VirtualCamera& truth : cameras) {
     const CameraError error = drawError(random);
     const double whole_px = distance_px(truth, mistaken(truth, error, 1.0), focus);
@@ -180,15 +182,21 @@ CameraCalibration calibrationOf(const std::vector<VirtualCamera>& cameras, const
     if (out.cameras.empty()) rig_from_world = seen.camera_from_rig.inverse();
     CalibratedCamera camera{truth.name, seen.model, seen.camera_from_rig * rig_from_world};
     if (out.cameras.empty()) camera.camera_from_world.setIdentity();
+    StatedError own{seen.camera_from_rig, kLensErrors, factor * kRotationError_rad,
+                    factor * kTranslationError_m};
+    const double pixels = truth.model.widthPx() / kFullWidth_px;
+    for (std::size_t i = 0; i < own.lens.size(); ++i)
+      own.lens[i] *= factor * (i < 4 ? pixels : 1.0);
+    stated.push_back(own);
     if (factor > 0.0) {
-      camera.lens_sigma.assign(kLensErrors.begin(), kLensErrors.end());
-      for (double& sigma : camera.lens_sigma) sigma *= factor;
+      camera.lens_sigma.assign(own.lens.begin(), own.lens.end());
       const double moved = out.cameras.empty() ? 0.0 : factor;  // the first one is the world
       camera.rotation_sigma_rad.setConstant(moved * kRotationError_rad);
       camera.translation_sigma_m.setConstant(moved * kTranslationError_m);
     }
     out.cameras.push_back(std::move(camera));
   }
+  stateCovariance(stated, out);
   out.quality.rms_px = error_px;
   out.rig = RigFrame{rig_from_world, rig_from_world.linear().transpose() * kDefaultGravity};
   return out;
