@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From rendered images to a measurement, against the truth: boards, calibration, images, reconstruction. One row of
-docs/results-images.md for each protocol.
+docs/results-images.md for each protocol; with all five fit protocols also the material, from images and without errors.
 
     bench/end_to_end.py [--fabric knit-12] [--seed 5521] [--frames 6] [--width 1936] [--boards 20] [--folder DIR]
                         [--table FILE] [PROTOCOL...]
@@ -24,9 +24,17 @@ from read_measurement import read_measurement  # noqa: E402
 
 PROTOCOLS = ["stretch-weft", "stretch-warp", "shear", "bend-weft", "bend-warp", "complex-shear", "corner-pull"]
 LIMIT_M = 0.03e-3
+FITTED = ["stretch-weft", "stretch-warp", "shear", "bend-weft", "bend-warp"]
+BAND = 1.96  # standard deviations that hold 95 %
 MARKER = "<!-- table by bench/end_to_end.py -->"
 HEAD = """| protocol | frames | vertices valid | error | one sigma holds x, y, z | worst valid vertex | clamped | clips: place; turn | cords | s a frame |
 |---|---|---|---|---|---|---|---|---|---|
+"""
+MATERIAL_HEAD = """Material, StVK orthotropic, fitted to the five tests: every knot that the images give (N/m, N m), its 95 % band, and the curve that
+the same frames without errors give there.
+
+| component | strain | from images | from the truth | within the images' band |
+|---|---|---|---|---|
 """
 
 
@@ -117,6 +125,50 @@ def row(protocol, options, folder):
     return "| " + " | ".join(cells) + " |", error <= LIMIT_M
 
 
+def stiffness(component, strain):
+    """Of a curve at a strain: cubic Hermite between its knots, constant beyond."""
+    knots = component["knots"]
+    if strain <= knots[0]["strain"]:
+        return knots[0]["stiffness"]
+    for a, b in zip(knots, knots[1:]):
+        if strain <= b["strain"]:
+            h = b["strain"] - a["strain"]
+            t = (strain - a["strain"]) / h
+            return ((2 * t**3 - 3 * t**2 + 1) * a["stiffness"] + (t**3 - 2 * t**2 + t) * h * a["tangent"]
+                    + (3 * t**2 - 2 * t**3) * b["stiffness"] + (t**3 - t**2) * h * b["tangent"])
+    return knots[-1]["stiffness"]
+
+
+def band(component, strain):
+    """Half a 95 % band, linear between knots; None where a knot beside it is not observed."""
+    knots = component["knots"]
+    strains = [k["strain"] for k in knots]
+    right = min(int(np.searchsorted(strains, strain)), len(knots) - 1)
+    left = max(right - 1, 0) if strains[right] > strain else right
+    if knots[left]["std"] is None or knots[right]["std"] is None:
+        return None
+    return BAND * float(np.interp(strain, strains, [k["std"] or 0.0 for k in knots]))
+
+
+def compare_materials(folder):
+    """Rows: every observed knot of the material from images beside the curve that was fitted to the truth."""
+    fits = {}
+    for name, place in (("images", "{}-measurement"), ("truth", "{}-truth/exact")):
+        made(f"{name}-material.json", "fit", *[place.format(p) for p in FITTED], "--model", "stvk", "--variant", "orthotropic",
+             "-o", f"{name}-material.json", folder=folder)
+        fits[name] = {c["name"]: c for c in json.loads((folder / f"{name}-material.json").read_text())["components"]}
+    rows = []
+    for name, seen in fits["images"].items():
+        for knot in seen["knots"]:
+            true, own = stiffness(fits["truth"][name], knot["strain"]), band(seen, knot["strain"])
+            other = band(fits["truth"][name], knot["strain"])
+            verdict = "not observed" if own is None else "yes" if abs(knot["stiffness"] - true) <= own else "no"
+            shown = [f"{value:.3g}" + (f" +- {half:.2g}" if half is not None else "")
+                     for value, half in ((knot["stiffness"], own), (true, other))]
+            rows.append(f"| {name} | {knot['strain']:.4g} | {shown[0]} | {shown[1]} | {verdict} |")
+    return rows
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fabric", default="knit-12")
@@ -128,7 +180,7 @@ def main():
     parser.add_argument("--table", type=pathlib.Path, help="page whose table, after the marker, is replaced")
     parser.add_argument("protocols", nargs="*")
     options = parser.parse_args()
-    good, rows = True, []
+    good, rows, material = True, [], []
     with tempfile.TemporaryDirectory() as scratch:
         folder = (options.folder or pathlib.Path(scratch)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
@@ -137,9 +189,15 @@ def main():
             good = good and fine
             rows.append(text)
             print(text, flush=True)
+        if set(FITTED) <= set(options.protocols or PROTOCOLS):
+            material = compare_materials(folder)
+            print("\n".join(material))
     if options.table:
         before = options.table.read_text().split(MARKER)[0]
-        options.table.write_text(before + MARKER + "\n\n" + HEAD + "\n".join(rows) + "\n")
+        text = before + MARKER + "\n\n" + HEAD + "\n".join(rows) + "\n"
+        if material:
+            text += "\n" + MATERIAL_HEAD + "\n".join(material) + "\n"
+        options.table.write_text(text)
     return 0 if good else 1
 
 

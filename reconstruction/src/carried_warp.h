@@ -19,7 +19,14 @@ class CarriedWarp {
   /// cannot see it.
   SubsetWarp of(int vertex, const Points3& positions, const CameraView& view) const;
 
+  /// What vectors along the mesh at rest become; vectors across it become zero.
+  Mat3 gradient(int vertex, const Points3& positions) const;
+
  private:
+  /// The tangents at rest, orthonormal, and what they become; false where the mesh has no area.
+  bool carry(int vertex, const Points3& positions, Eigen::Matrix<double, 3, 2>& tangents,
+             Eigen::Matrix<double, 3, 2>& carried) const;
+
   Points3 rest_;
   std::vector<std::vector<int>> neighbours_;
 };

@@ -24,6 +24,25 @@ struct TrackedView {
   std::optional<PointTracker> tracker;
 };
 
+/// The surface at rest with the covariances of its matches alone.
+ClothFrame matchedFrame(const RestSurface& surface) {
+  ClothFrame frame;
+  frame.positions_m = surface.mesh.positions;
+  for (const RestVertex& vertex : surface.vertices) {
+    const bool valid = vertex.state == PointState::kValid;
+    // A filled vertex may err by several pixels.
+    constexpr double kFilledError_px = 5.0;
+    const double guess = kFilledError_px * surface.pixel_m;
+    frame.covariances_m2.push_back(valid ? vertex.point.covariance_m2
+                                         : Mat3(guess * guess * Mat3::Identity()));
+    frame.states.push_back(vertex.state);
+    frame.views.push_back(static_cast<std::uint8_t>(valid ? vertex.sightings.size() : 0));
+    frame.zncc.push_back(static_cast<float>(vertex.zncc));
+    frame.residual_px.push_back(static_cast<float>(valid ? vertex.point.residual_px : 0.0));
+  }
+  return frame;
+}
+
 }  // namespace
 
 struct ClothTracker::State {
@@ -113,8 +132,6 @@ void ClothTracker::State::locate(int vertex, std::vector<Sighting>& seen,
     if (worst == seen.size()) {
       frame.positions_m.col(vertex) = point->position_m;
       frame.covariances_m2[vertex] = point->covariance_m2;
-      if (surface.systematic)
-        frame.covariances_m2[vertex] += surface.systematic->covarianceAt(point->position_m, seen);
       frame.residual_px[vertex] = static_cast<float>(point->residual_px);
       frame.views[vertex] = static_cast<std::uint8_t>(seen.size());
       frame.states[vertex] = PointState::kValid;
@@ -147,8 +164,7 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
   const std::size_t count = s.surface.vertices.size();
   std::vector<std::vector<Sighting>> seen(count);
   std::vector<std::vector<std::size_t>> places(count);
-  ClothFrame frame = restFrame(s.surface);
-  frame.warnings.clear();
+  ClothFrame frame = matchedFrame(s.surface);
   for (std::size_t i = 0; i < count; ++i) {
     frame.zncc[i] = 1.0F;
     frame.views[i] = 0;
@@ -186,12 +202,22 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
   parallelFor(count, s.options.correlate.threads, [&](std::size_t i, std::size_t) {
     s.locate(static_cast<int>(i), seen[i], places[i], frame);
   });
+  std::vector<std::uint8_t> found(count);
+  for (std::size_t i = 0; i < count; ++i) found[i] = frame.states[i] == PointState::kValid;
   for (const KnownVertex& vertex : known) {
+    found[vertex.vertex] = 0;
     frame.positions_m.col(vertex.vertex) = vertex.position_m;
     frame.covariances_m2[vertex.vertex] = vertex.covariance_m2;
     frame.states[vertex.vertex] = PointState::kValid;
   }
   frame.filled_m = s.fill.complete(frame, s.last);
+  parallelFor(count, s.options.correlate.threads, [&](std::size_t i, std::size_t) {
+    const auto vertex = static_cast<int>(i);
+    if (found[i] != 0)
+      frame.covariances_m2[i] +=
+          s.surface.systematicAt(vertex, frame.positions_m.col(vertex), seen[i],
+                                 s.carried.gradient(vertex, frame.positions_m));
+  });
   s.last = frame.positions_m;
   return frame;
 }
@@ -215,21 +241,16 @@ std::size_t ClothFrame::validCount() const {
 }
 
 ClothFrame restFrame(const RestSurface& surface) {
-  ClothFrame frame;
-  frame.positions_m = surface.mesh.positions;
+  ClothFrame frame = matchedFrame(surface);
+  const CarriedWarp carried(surface.mesh);
   for (int i = 0; i < static_cast<int>(surface.vertices.size()); ++i) {
-    const RestVertex& vertex = surface.vertices[i];
-    const bool valid = vertex.state == PointState::kValid;
-    // A filled vertex may err by several pixels.
-    constexpr double kFilledError_px = 5.0;
-    const double guess = kFilledError_px * surface.pixel_m;
-    frame.covariances_m2.push_back(
-        valid ? Mat3(vertex.point.covariance_m2 + surface.systematicAt(i, vertex.point.position_m))
-              : Mat3(guess * guess * Mat3::Identity()));
-    frame.states.push_back(vertex.state);
-    frame.views.push_back(static_cast<std::uint8_t>(valid ? vertex.sightings.size() : 0));
-    frame.zncc.push_back(static_cast<float>(vertex.zncc));
-    frame.residual_px.push_back(static_cast<float>(valid ? vertex.point.residual_px : 0.0));
+    if (surface.vertices[i].state != PointState::kValid) continue;
+    // Along the surface a vertex is where its node is.
+    const Mat3 along = carried.gradient(i, surface.mesh.positions);
+    const Mat3 across = Mat3::Identity() - along;
+    frame.covariances_m2[i] =
+        across * frame.covariances_m2[i] * across.transpose() +
+        surface.systematicAt(i, surface.mesh.positions.col(i), surface.sightingsOf(i), along);
   }
   return frame;
 }

@@ -177,11 +177,20 @@ std::size_t RestSurface::validCount() const {
                     [](const RestVertex& vertex) { return vertex.state == PointState::kValid; }));
 }
 
-Mat3 RestSurface::systematicAt(int vertex, const Vec3& position_m) const {
-  if (!systematic) return Mat3::Zero();
+std::vector<Sighting> RestSurface::sightingsOf(int vertex) const {
   std::vector<Sighting> seen;
   for (const VertexSighting& s : vertices[vertex].sightings) seen.push_back(s.sighting);
-  return systematic->covarianceAt(position_m, seen);
+  return seen;
+}
+
+Mat3 RestSurface::systematicAt(int vertex, const Vec3& position_m,
+                               std::span<const Sighting> sightings, const Mat3& gradient) const {
+  if (!systematic) return Mat3::Zero();
+  const SystematicError::PlaceRows now = systematic->placeByParameters(position_m, sightings);
+  if (vertices[vertex].state != PointState::kValid) return systematic->covarianceOf(now);
+  const SystematicError::PlaceRows at_rest =
+      systematic->placeByParameters(mesh.positions.col(vertex), sightingsOf(vertex));
+  return systematic->covarianceOf(now - gradient * at_rest);
 }
 
 void addSystematicError(const CameraCalibration* calibration, const std::vector<CameraView>& views,

@@ -32,6 +32,9 @@ std::vector<MountedClip> taggedClips(const Mounting& mounting) {
   return tagged;
 }
 
+/// Drops what stands across the sample at rest, and across the table: both are level.
+Mat3 alongRest() { return Vec3(1.0, 1.0, 0.0).asDiagonal(); }
+
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -83,10 +86,12 @@ void RigReader::hold(const MountedClip& clip, const ClipPose& pose, Reading& rea
     const Vec3 rest = rest_.mesh.positions.col(vertex);
     const double sigma =
         std::hypot(pose.position_sigma_m, pose.rotation_sigma_rad * (rest - middle).norm());
-    const Mat3 own = rest_.vertices[vertex].state == PointState::kValid
-                         ? Mat3(rest_.vertices[vertex].point.covariance_m2 +
-                                rest_.systematicAt(vertex, pose.rig_from_clip * rest))
-                         : Mat3(Mat3::Zero());
+    const Mat3 own =
+        rest_.vertices[vertex].state == PointState::kValid
+            ? Mat3(rest_.vertices[vertex].point.covariance_m2 +
+                   rest_.systematicAt(vertex, pose.rig_from_clip * rest, rest_.sightingsOf(vertex),
+                                      pose.rig_from_clip.linear() * alongRest()))
+            : Mat3(Mat3::Zero());
     reading.held.push_back(
         {vertex, pose.rig_from_clip * rest, sigma * sigma * Mat3::Identity() + own});
   }
@@ -177,8 +182,8 @@ void RigReader::addTable(ClothFrame& cloth, Reading& reading) const {
     const Mat3 own = rest_.vertices[i].state == PointState::kValid
                          ? rest_.vertices[i].point.covariance_m2
                          : Mat3(Mat3::Zero());
-    cloth.covariances_m2[i] =
-        scatter * scatter * Mat3::Identity() + own + rest_.systematicAt(i, at);
+    cloth.covariances_m2[i] = scatter * scatter * Mat3::Identity() + own +
+                              rest_.systematicAt(i, at, rest_.sightingsOf(i), alongRest());
     cloth.states[i] = PointState::kValid;
   }
   // The sample's outline in its plane, cut at the edge, then in material coordinates.

@@ -127,25 +127,24 @@ bool SystematicError::pixelByParameters(const View& view, const Vec3& point_m,
   return true;
 }
 
-Mat3 SystematicError::covarianceAt(const Vec3& point_m, std::span<const Sighting> sightings) const {
+SystematicError::PlaceRows SystematicError::placeByParameters(
+    const Vec3& point_m, std::span<const Sighting> sightings) const {
   Mat3 normal = Mat3::Zero();
-  Eigen::Matrix<double, 3, Eigen::Dynamic> right(3, covariance_.rows());
-  right.setZero();
+  PlaceRows right = PlaceRows::Zero(3, covariance_.rows());
   PixelRows rows;
   for (const Sighting& seen : sightings) {
     const View& view = views_[static_cast<std::size_t>(seen.view)];
     Eigen::Matrix<double, 2, 3> jacobian;
     if (!view.view.project(point_m, &jacobian) || !pixelByParameters(view, point_m, rows))
-      return Mat3::Zero();
+      return PlaceRows::Zero(3, covariance_.rows());
     const Eigen::Matrix<double, 3, 2> weighted =
         jacobian.transpose() * seen.covariance_px2.inverse();
     normal += weighted * jacobian;
-    right.noalias() += weighted * rows;
+    right.noalias() -= weighted * rows;
   }
   const Eigen::LDLT<Mat3> factor(normal);
-  if (sightings.size() < 2 || !factor.isPositive()) return Mat3::Zero();
-  const Eigen::Matrix<double, 3, Eigen::Dynamic> by_parameters = factor.solve(right);
-  return by_parameters * covariance_ * by_parameters.transpose();
+  if (sightings.size() < 2 || !factor.isPositive()) return PlaceRows::Zero(3, covariance_.rows());
+  return factor.solve(right);
 }
 
 }  // namespace tenter

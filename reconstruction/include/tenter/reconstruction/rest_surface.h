@@ -50,8 +50,13 @@ struct RestSurface {
   std::vector<std::string> warnings;
 
   std::size_t validCount() const;
-  /// Systematic part at a vertex, as it is seen at rest; zero where nothing is known.
-  Mat3 systematicAt(int vertex, const Vec3& position_m) const;
+  /// Systematic part of a vertex's place, seen by `sightings`. Along the surface a vertex is where
+  /// its node is, whatever the calibration: there only what has changed since rest errs. `gradient`
+  /// takes vectors along the surface from rest to the moment. Zero where nothing is known.
+  Mat3 systematicAt(int vertex, const Vec3& position_m, std::span<const Sighting> sightings,
+                    const Mat3& gradient) const;
+  /// The sightings at rest.
+  std::vector<Sighting> sightingsOf(int vertex) const;
 };
 
 /// By the calibration's covariance, or where it states none (or none is given) by how far views

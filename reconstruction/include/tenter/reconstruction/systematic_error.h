@@ -22,8 +22,14 @@ class SystematicError {
   /// standard deviation per axis.
   static SystematicError ofOffsets(const std::vector<CameraView>& views, double offset_px);
 
+  /// d(place)/d(parameters), 3 x all.
+  using PlaceRows = Eigen::Matrix<double, 3, Eigen::Dynamic>;
   /// Of a point in space that is triangulated from these sightings; zero where it cannot be seen.
-  Mat3 covarianceAt(const Vec3& point_m, std::span<const Sighting> sightings) const;
+  PlaceRows placeByParameters(const Vec3& point_m, std::span<const Sighting> sightings) const;
+  Mat3 covarianceOf(const PlaceRows& rows) const { return rows * covariance_ * rows.transpose(); }
+  Mat3 covarianceAt(const Vec3& point_m, std::span<const Sighting> sightings) const {
+    return covarianceOf(placeByParameters(point_m, sightings));
+  }
 
  private:
   static constexpr int kLensTerms = 9;  ///< fx fy cx cy k1 k2 p1 p2 k3.
