@@ -78,8 +78,6 @@ TEST(InversionTest, ForcesKeepOffTheConesBordersWhereTheyCan) {
   const auto arch = invert(standing(10, reference(2.0)), {});
   expectCertified(arch);
   EXPECT_GE(arch->certificate.cone_margin_min, kRoom - 1e-6);
-  EXPECT_GE(arch->solve_seconds, 0.0);
-  EXPECT_LE(arch->solve_seconds, arch->seconds);
 }
 
 TEST(InversionTest, WithoutInversionTheArchSags) {
