@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Targets after the rows of table 1 of [Inv18], inverted one by one into a table of results.
 
-    bench/inversion_cases.py build/release/bin/tenter OUT [--only skirt,page] [--time-budget 60] [--range skirt,page]
-                             [--reference SECONDS] [--materials FITTED.json ...] [--table FILE.md]
+    bench/inversion_cases.py build/release/bin/tenter OUT [--only skirt,page] [--time-budget 60] [--resimulate]
+                             [--range skirt,page] [--sweep skirt,page] [--reference skirt,page] [--reference-seconds 60]
+                             [--materials FITTED.json ...] [--growth] [--table FILE.md]
 
 The shapes are generated: surfaces of revolution and their like in metres, resting on analytic bodies. Friction is that of the
-paper, and so is the material, times the first of 1, 2, 4, 8 that is certified. --range looks for the softest multiple of some,
---reference runs the paper's algorithm on the same problem for so many seconds, --materials inverts three targets of
-fitted cloth, with their material turned by 90 degrees too.
+paper, and so is the material, times the first of 1, 2, 4, 8 that is certified. --resimulate lets what is certified move for
+5 s, --range looks for the softest multiple of some, --sweep inverts at 2 to 1/64 of the paper's stiffness, --reference runs the
+paper's algorithm on the same problem, --materials inverts three targets of fitted cloth, with their material turned by 90
+degrees too, --growth inverts one garment on ever finer meshes. Answers that OUT holds already are used again. --table
+replaces what stands after the marker of a page.
 """
 import argparse
 import json
@@ -42,110 +45,142 @@ def tube(columns, rows, radius, height):
     return np.array(points), grid_triangles(columns, rows, True)
 
 
-def disc(columns, rings, radius, height):
-    """A pole, then rings outwards."""
-    points, faces = [(0.0, 0.0, height(0.0, 0.0))], []
-    for j in range(1, rings + 1):
-        s = j / rings
-        for i in range(columns):
-            angle = 2.0 * np.pi * i / columns
-            r = radius(s, angle)
-            points.append((r * np.cos(angle), r * np.sin(angle), height(s, angle)))
-    faces += [(0, 1 + i, 1 + (i + 1) % columns) for i in range(columns)]
-    faces += [tuple(v + 1 for v in f) for f in grid_triangles(columns, rings, True)]
-    return np.array(points), faces
-
-
 def smooth(t):
     t = np.clip(t, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-def skirt(columns, rows, lobes, depth, contact_rows, flare):
-    slope, top = 0.5, 0.12  # of the cone that carries it
-
-    def radius(s, angle):
-        z = 0.4 * s
-        free = max(0.0, s - (contact_rows - 1) / (rows - 1))
-        return top + slope * z + flare * free * free * (1.0 + depth * np.cos(lobes * angle))
-
-    points, faces = tube(columns, rows, radius, lambda s: -0.4 * s)
-    return points, faces, [f"cone:0,0,0,0,0,-1,{top},{top + slope}"]
+def curve(start, heading, length, count):
+    """Points in (radius, height) every length / (count - 1), along headings [rad] below the horizontal of t in 0..1."""
+    fine = 200
+    t = (np.arange(fine * (count - 1)) + 0.5) / (fine * (count - 1))
+    angle = np.array([heading(v) for v in t])
+    steps = length / len(t) * np.column_stack([np.cos(angle), -np.sin(angle)])
+    return np.vstack([start, start + np.cumsum(steps, axis=0)[fine - 1::fine]])
 
 
-def page(n):
-    radius = 0.06
-    angle = np.pi * np.arange(n) / (n - 1)
-    points = [(-radius * np.cos(angle[i]), 0.25 * j / (n - 1), radius * np.sin(angle[i]) * (0 < i < n - 1))
-              for j in range(n) for i in range(n)]
-    return np.array(points), grid_triangles(n, n, False), ["plane:0,0,0,0,0,1"]
+def stitch(inner, outer):
+    """Triangles between two closed rings of any number of vertices, given as the numbers of their vertices."""
+    faces, i, j = [], 0, 0
+    while i < len(inner) or j < len(outer):
+        a, b = inner[i % len(inner)], outer[j % len(outer)]
+        if (i + 1) * len(outer) <= (j + 1) * len(inner) - 0.5 * (len(inner) - len(outer)) or j == len(outer):
+            faces.append((a, b, inner[(i + 1) % len(inner)]))
+            i += 1
+        else:
+            faces.append((a, b, outer[(j + 1) % len(outer)]))
+            j += 1
+    return faces
+
+
+def dome(profile, counts, waves=lambda s: 0.0, lobes=0):
+    """A pole, then rings of so many vertices along a profile, their radius times 1 + waves(s) cos(lobes angle)."""
+    points, faces, before = [(0.0, 0.0, profile[0][1])], [], [0]
+    for j, ((r, z), count) in enumerate(zip(profile[1:], counts), 1):
+        ring = list(range(len(points), len(points) + count))
+        for a in 2.0 * np.pi * np.arange(count) / count:
+            w = r * (1.0 + waves(j / (len(profile) - 1)) * np.cos(lobes * a))
+            points.append((w * np.cos(a), w * np.sin(a), z))
+        faces += [(0, v, ring[(i + 1) % count]) for i, v in enumerate(ring)] if j == 1 else stitch(before, ring)
+        before = ring
+    return np.array(points), faces
+
+
+def skirt(columns, rows, lobes, depth, contact_rows):
+    """On a cone with its upper rows; below it flares, and hangs in lobes that deepen towards the hem."""
+    slope, top, length = 0.35, 0.12, 0.42
+    cone = np.arctan2(1.0, slope)
+    on_body = (contact_rows - 1) / (rows - 1)
+
+    def free(s):
+        return np.clip((s - on_body) / (1.0 - on_body), 0.0, 1.0)
+
+    profile = curve((top, 0.0), lambda s: cone if s <= on_body else cone - 0.5 + 0.4 * free(s), length, rows)
+    angle = 2.0 * np.pi * np.arange(columns) / columns
+    points = [(w * np.cos(a), w * np.sin(a), z) for j, (r, z) in enumerate(profile) for a in angle
+              for w in [r * (1.0 + depth * free(j / (rows - 1)) ** 2 * np.cos(lobes * a))]]
+    return np.array(points), grid_triangles(columns, rows, True), [f"cone:0,0,0,0,0,-1,{top},{top + slope}"]
+
+
+def page(across, along, margin):
+    """A half cylinder on two margins that lie on the page below, joined by a narrow bend."""
+    radius, bend, length = 0.05, 0.012, 0.2
+    arc = np.pi * radius + 2 * 0.5 * np.pi * bend
+    step = arc / (across - 1 - 2 * (margin - 1))
+    total = step * (across - 1)
+
+    def heading(t):
+        s = min(t, 1.0 - t) * total - step * (margin - 1)
+        up = np.pi / 2 * np.clip(s / (0.5 * np.pi * bend), 0.0, 1.0)
+        turned = max(0.0, s - 0.5 * np.pi * bend) / radius
+        return (turned - up) * (1.0 if t < 0.5 else -1.0)
+
+    profile = curve((0.0, 0.0), heading, total, across)
+    points = [(x - 0.5 * profile[-1][0], length * j / (along - 1), z) for j in range(along) for x, z in profile]
+    return np.array(points), grid_triangles(across, along, False), ["plane:0,0,0,0,0,1"]
 
 
 HEAD = 0.1
 
 
-def beret(columns, rings):
-    """Over the top, out to a soft edge, and back in to a band around the head."""
-    band = 55.0 * np.pi / 180.0
-
-    def profile(s):
-        if s >= 0.92:
-            polar = band + (s - 0.92) * 2.2
-            return HEAD * np.sin(polar), HEAD * np.cos(polar)
-        t = s / 0.92
-        angle = np.pi * 0.86 * t
-        out = 0.17 * np.sin(angle) if angle < np.pi / 2 else None
-        edge_r, edge_z = 0.15, HEAD * np.cos(band) + 0.035
-        end_r, end_z = HEAD * np.sin(band), HEAD * np.cos(band)
-        if t < 0.6:
-            u = t / 0.6
-            return edge_r * np.sin(0.5 * np.pi * u), edge_z + 0.045 * np.cos(0.5 * np.pi * u)
-        u = (t - 0.6) / 0.4
-        return edge_r + (end_r - edge_r) * u * u * (3 - 2 * u) if out is None else edge_r - (edge_r - end_r) * u, (
-            edge_z - (edge_z - end_z) * np.sin(0.5 * np.pi * u))
-
-    points, faces = disc(columns, rings, lambda s, a: profile(s)[0], lambda s, a: profile(s)[1])
-    return points, [(f[0], f[2], f[1])[::-1] for f in faces], [f"sphere:0,0,0,{HEAD}"]
+def on_head(begin, end, count):
+    polar = np.linspace(begin, end, count)
+    return HEAD * np.column_stack([np.sin(polar), np.cos(polar)])
 
 
-def hat(columns, rings):
-    """A crown that lies on the head, and a brim that hangs out from it in waves."""
-    edge = 1.15
+def spread(profile, edge):
+    """How many vertices of that distance fit each ring."""
+    return [max(6, round(2.0 * np.pi * r / edge)) for r, _ in profile]
 
-    def parts(s):
-        polar = min(edge, 2.1 * edge * s)
-        return polar, max(0.0, s - 1.0 / 2.1) / (1.0 - 1.0 / 2.1)
 
-    def radius(s, angle):
-        polar, brim = parts(s)
-        return HEAD * np.sin(polar) + 0.09 * brim * (1.0 + 0.2 * brim * np.cos(5 * angle))
-
-    def height(s, angle):
-        polar, brim = parts(s)
-        return HEAD * np.cos(polar) - 0.09 * brim * (1.0 - 0.2 * brim * np.cos(5 * angle))
-
-    points, faces = disc(columns, rings, radius, height)
+def beret(rows):
+    """A dome over the head, out to a soft edge, and back in to a band of two rings around the head."""
+    band = on_head(np.radians(68.0), np.radians(75.0), 2)
+    edge, rise, drop = 0.14, 0.045, 0.035
+    arc = np.linspace(0.0, 1.0, 2000)
+    upper = np.column_stack([edge * np.sin(np.pi / 2 * arc), rise * np.cos(np.pi / 2 * arc)])
+    lower = np.column_stack([band[0][0] + (edge - band[0][0]) * (1.0 - arc ** 3), -drop * arc])
+    outline = np.vstack([upper, lower[1:]]) + (0.0, band[0][1] + drop)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(outline, axis=0), axis=1))])
+    at = np.linspace(0.0, along[-1], rows)
+    profile = np.column_stack([np.interp(at, along, outline[:, k]) for k in range(2)])
+    points, faces = dome(np.vstack([profile, band[1:]]), spread(profile[1:-1], 0.0122) + [35, 34])
     return points, faces, [f"sphere:0,0,0,{HEAD}"]
 
 
-def barrel(columns, rows, length, radius, bulge, top_rows, bottom_rows):
-    """A tube on an upright, slightly conical body that it leaves between its ends."""
+def hat(crown, brim):
+    """A crown that lies on the head, and a brim that flares out of it and hangs down in waves."""
+    edge, width = 1.15, 0.12
+    on_body = on_head(0.0, edge, crown + 1)
+    # As steep as the head at its edge, then flatter, then hanging.
+    free = curve(on_body[-1], lambda t: edge - 0.5 * smooth(t / 0.3) + 0.7 * smooth((t - 0.3) / 0.7), width, brim + 1)[1:]
+    start = crown / (crown + brim)
+    points, faces = dome(np.vstack([on_body, free]), [6 * (j + 1) for j in range(crown)] + spread(free, 0.0122),
+                         lambda s: 0.12 * smooth((s - start) / (1.0 - start)), 5)
+    return points, faces, [f"sphere:0,0,0,{HEAD}"]
+
+
+def barrel(columns, rows, length, radius, bulge, top_rows, bottom_rows, end=0.0):
+    """A tube on an upright, slightly conical body that it leaves between its ends, and below by `end` if that is not 0."""
     slope = 0.15
 
     def radius_at(s, angle):
-        begin, end = (top_rows - 1) / (rows - 1), 1.0 - (bottom_rows - 1) / (rows - 1)
+        begin, last = (top_rows - 1) / (rows - 1), 1.0 - max(0, bottom_rows - 1) / (rows - 1)
         body = radius + slope * length * s
-        if s <= begin or s >= end:
+        if s <= begin or (s >= last and bottom_rows > 0):
             return body
-        return body + bulge * np.sin(np.pi * (s - begin) / (end - begin)) ** 2
+        t = (s - begin) / (last - begin)
+        return body + bulge * np.sin(np.pi * t) ** 2 + end * smooth(t)
 
     points, faces = tube(columns, rows, radius_at, lambda s: -length * s)
     return points, faces, [f"cone:0,0,0,0,0,-1,{radius},{radius + slope}"]
 
 
 def sleeve(columns, rows):
-    points, faces = tube(columns, rows, lambda s, a: 0.045 + 0.05 * np.sin(np.pi * np.clip((s - 0.08) / 0.84, 0, 1)) ** 2,
-                         lambda s: -0.25 * s)
+    """Puffed between two cuffs, of two rings and of one, on an arm that is held out."""
+    begin = 1.0 / (rows - 1)
+    points, faces = tube(columns, rows, lambda s, a: 0.045 + 0.04 * np.sin(np.pi * np.clip((s - begin) / (1.0 - begin), 0, 1)) ** 2,
+                         lambda s: -0.2 * s)
     return points[:, [2, 0, 1]], faces, ["cylinder:0,0,0,1,0,0,0.045"]
 
 
@@ -160,17 +195,19 @@ def shirt(columns, rows):
 
 # name: shape, rho, k_L, k_theta, mu of table 1
 CASES = {
-    "skirt": (lambda: skirt(20, 10, 5, 0.3, 2, 0.6), 0.1, 3.0, 5e-3, 0.6),
-    "page": (lambda: page(29), 10.0, 5.0, 2e-3, 0.4),
-    "beret": (lambda: beret(36, 23), 0.25, 5e-2, 5e-4, 0.3),
-    "hat": (lambda: hat(36, 24), 2.5, 5.0, 5e-4, 0.6),
-    "top": (lambda: barrel(36, 25, 0.4, 0.14, 0.04, 3, 2), 0.5, 0.2, 1e-1, 0.2),
-    "saroual": (lambda: barrel(50, 50, 0.7, 0.11, 0.12, 2, 2), 0.05, 1.0, 1e-2, 0.2),
-    "sleeve": (lambda: sleeve(20, 20), 1.0, 0.1, 1e-3, 0.7),
-    "gored": (lambda: skirt(45, 28, 9, 0.5, 4, 0.5), 0.05, 0.8, 5e-3, 0.7),
+    "skirt": (lambda: skirt(20, 10, 5, 0.12, 1), 0.1, 3.0, 5e-3, 0.6),
+    "page": (lambda: page(43, 19, 4), 10.0, 5.0, 2e-3, 0.4),
+    "sleeve": (lambda: sleeve(22, 18), 1.0, 0.1, 1e-3, 0.7),
+    "beret": (lambda: beret(19), 0.25, 5e-2, 5e-4, 0.3),
+    "hat": (lambda: hat(7, 10), 2.5, 5.0, 5e-4, 0.6),
+    "top": (lambda: barrel(29, 31, 0.4, 0.14, 0.04, 3, 1), 0.5, 0.2, 1e-1, 0.2),
+    "saroual": (lambda: barrel(61, 41, 0.7, 0.11, 0.1, 1, 0, 0.02), 0.05, 1.0, 1e-2, 0.2),
+    "gored": (lambda: skirt(42, 30, 7, 0.15, 4), 0.05, 0.8, 5e-3, 0.7),
     "shirt": (lambda: shirt(51, 50), 1.0, 3.0, 5e-4, 0.2),
 }
 MULTIPLES = [1, 2, 4, 8]
+MARKER = "<!-- tables by bench/inversion_cases.py -->"
+CONTACT_DISTANCE_MM = {"shirt": 0.6}  # The others lie on their bodies exactly.
 
 
 def over_sphere(n):
@@ -251,33 +288,85 @@ def invert(program, target, out, bodies, friction, budget, more):
     return answer
 
 
-def constants(rho, stretch, bend, factor):
-    return ["--rho", rho, "--k-stretch", stretch * factor, "--k-bend", bend * factor]
+def constants(name, factor):
+    _, rho, stretch, bend, _ = CASES[name]
+    return ["--rho", rho, "--k-stretch", stretch * factor, "--k-bend", bend * factor, "--contact-distance-mm",
+            CONTACT_DISTANCE_MM.get(name, 0.01)]
 
 
-def run(program, name, options):
-    shape, rho, stretch, bend, mu = CASES[name]
-    points, faces, bodies = shape()
-    target = options.out / f"{name}.obj"
-    write_obj(target, points, faces)
+def kept(path, make):
+    """What was made before, or is made now."""
+    if not path.exists():
+        path.write_text(json.dumps(make()), encoding="utf-8")
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def softest(program, name, points, target, bodies, options):
+    """The first multiple that is certified, or the last."""
     for factor in MULTIPLES:
-        answer = invert(program, target, options.out / name, bodies, mu, options.time_budget,
-                        constants(rho, stretch, bend, factor))
+        answer = invert(program, target, options.out / name, bodies, CASES[name][4], options.time_budget, constants(name, factor))
         answer.update(name=name, factor=factor, vertices=len(points))
         if answer["status"] == "certified":
             break
+    return answer
+
+
+def resimulate(program, name, gravity, options):
+    output = options.out / f"{name}-{gravity}.pvd"
+    command = [program, "resimulate", options.out / name, "--seconds", 5, "--gravity-scale", gravity, "--time-budget",
+               10 * options.time_budget, "-o", output, "--json"]
+    done = subprocess.run([str(c) for c in command], stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    if done.returncode not in (0, 5):
+        sys.exit(f"{name}: exit {done.returncode}: {done.stderr}")
+    return json.loads(done.stdout)
+
+
+def run(program, name, options):
+    shape, _, _, _, mu = CASES[name]
+    points, faces, bodies = shape()
+    target = options.out / f"{name}.obj"
+    write_obj(target, points, faces)
+    answer = kept(options.out / f"{name}.answer.json", lambda: softest(program, name, points, target, bodies, options))
+    if answer["status"] == "certified" and options.resimulate:
+        answer["still"], answer["heavier"] = [
+            kept(options.out / f"{name}-{g}.answer.json", lambda: resimulate(program, name, g, options)) for g in (1, 1.01)]
+    if name in options.sweep.split(","):
+        answer["sweep"] = [kept(options.out / f"{name}-sweep-{k}.answer.json", lambda: invert(
+            program, target, options.out / f"{name}-sweep", bodies, mu, options.time_budget, constants(name, 2.0 ** -k)))
+                           for k in range(-1, 7)]
     if name in options.range.split(","):
-        found = invert(program, target, options.out / f"{name}-range", bodies, mu, 4 * options.time_budget,
-                       constants(rho, stretch, bend, 1) + ["--range"])
-        answer["range"] = found["range"]
-    if options.reference:
-        answer["reference"] = invert(program, target, options.out / f"{name}-reference", bodies, mu, options.reference,
-                                     constants(rho, stretch, bend, answer["factor"]) + ["--method", "reference"])
+        answer["range"] = kept(options.out / f"{name}-range.answer.json", lambda: invert(
+            program, target, options.out / f"{name}-range", bodies, mu, 4 * options.time_budget, constants(name, 1) + ["--range"]))["range"]
+    if name in options.reference.split(","):
+        answer["reference"] = kept(options.out / f"{name}-reference.answer.json", lambda: invert(
+            program, target, options.out / f"{name}-reference", bodies, mu, options.reference_seconds,
+            constants(name, answer["factor"]) + ["--method", "reference"]))
+    return answer
+
+
+GROWTH = [(17, 12), (35, 25), (61, 41), (110, 90), (235, 170)]
+
+
+def grow(program, columns, rows, options):
+    """The saroual of the cases on that mesh, each edge as stiff as there: what it costs, not what it is."""
+    points, faces, bodies = barrel(columns, rows, 0.7, 0.11, 0.1, 1, 0, 0.02)
+    target, out = options.out / f"growth-{len(points)}.obj", options.out / f"growth-{len(points)}"
+    write_obj(target, points, faces)
+    answer = invert(program, target, out, bodies, CASES["saroual"][4], 10 * options.time_budget, constants("saroual", 1))
+    answer.update(name="saroual", factor=1, vertices=len(points), memory=resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)
     return answer
 
 
 def turned(uv):
     return np.column_stack([-uv[:, 1], uv[:, 0]])
+
+
+def laid_on(points, others):
+    """Points after the rigid motion that brings them nearest to others, since only contacts hold a rest shape's place."""
+    a, b = points - points.mean(axis=0), others - others.mean(axis=0)
+    u, _, v = np.linalg.svd(a.T @ b)
+    u[:, -1] *= np.sign(np.linalg.det(u @ v))
+    return a @ u @ v + others.mean(axis=0)
 
 
 def run_fabric(program, name, material, options):
@@ -297,7 +386,7 @@ def run_fabric(program, name, material, options):
     size = np.linalg.norm(points.max(axis=0) - points.min(axis=0))
     change = None
     if len(rests) == 2 and all(a["status"] == "certified" for a in answers):
-        change = np.linalg.norm(rests[1] - rests[0], axis=1).max() / size
+        change = np.linalg.norm(laid_on(rests[1], rests[0]) - rests[0], axis=1).max() / size
     answer.update(name=f"{material.stem}, {name}", vertices=len(points), factor=1, turned=change)
     return answer
 
@@ -312,17 +401,42 @@ def markdown(titles, rows):
 
 
 COMMON = ["Vertices", "Contacts", "Status", "F / weight", "Smallest margin", "lambda_min [1/s^2]", "Re-draped, of size", "Stretch",
-          "Bend [rad]", "Seconds", "CPU [s]"]
+          "Bend [rad]", "Solved [s]", "Certified [s]"]
 
 
 def common(r):
     return [r["vertices"], r["contacts"], r["status"], f"{r['force_residual_rel']:.1e}", f"{r['cone_margin_min']:.3f}",
             shown(r["lambda_min_per_s2"], ".3g"), shown(r["redrape_max_rel"], ".1e"), f"{r['stretch_max']:.4f}",
-            f"{r['bend_max_rad']:.3f}", f"{r['seconds']:.1f}", f"{r['cpu']:.1f}"]
+            f"{r['bend_max_rad']:.3f}", f"{r['solve_cpu_seconds']:.2f}", f"{r['cpu']:.2f}"]
 
 
 def case_table(rows):
     return markdown(["Case", "Multiple"] + COMMON, [[r["name"], r["factor"]] + common(r) for r in rows])
+
+
+def resimulation_table(rows):
+    return markdown(["Case", "Multiple", "Moves in 5 s, of size", "Stuck / sliding / off", "1 % more gravity: moves, of size", "Of the linear prediction",
+                     "Stuck / sliding / off"],
+                    [[r["name"], r["factor"], f"{q['max_displacement_rel']:.1e}", f"{q['stuck']} / {q['sliding']} / {q['off']}",
+                      f"{h['max_displacement_rel']:.1e}", shown((h["linear_response"] or {}).get("ratio"), ".2f"),
+                      f"{h['stuck']} / {h['sliding']} / {h['off']}"] for r in rows for q, h in [(r["still"], r["heavier"])]])
+
+
+def growth_rows(rows):
+    return markdown(["Vertices", "Contacts", "Status", "F / weight", "Solved [s]", "Certified [s]", "Peak memory [MB]"],
+                    [[r["vertices"], r["contacts"], r["status"], f"{r['force_residual_rel']:.1e}", f"{r['solve_cpu_seconds']:.2f}",
+                      f"{r['cpu']:.2f}", f"{r['memory']:.0f}"] for r in rows])
+
+
+def growth_table(rows):
+    last, before = [[np.log(r[k]) for k in ("vertices", "solve_cpu_seconds")] for r in (rows[-1], rows[1])]
+    return growth_rows(rows) + (
+        f"\nFrom the second row to the last *Solved* grows as vertices to the power {(last[1] - before[1]) / (last[0] - before[0]):.2f}.\n")
+
+
+def sweep_table(rows):
+    return markdown(["Case"] + ["2", "1", "1/2", "1/4", "1/8", "1/16", "1/32", "1/64"],
+                    [[r["name"]] + [q["status"] for q in r["sweep"]] for r in rows])
 
 
 def range_table(rows):
@@ -333,10 +447,10 @@ def range_table(rows):
 
 
 def reference_table(rows):
-    return markdown(["Case", "Multiple", "Status", "F / weight", "Contacts outside", "lambda_min [1/s^2]", "Seconds", "Ours: seconds",
+    return markdown(["Case", "Multiple", "Status", "F / weight", "Contacts outside", "lambda_min [1/s^2]", "Solved [s]", "Ours: solved [s]",
                      "Ours: F / weight", "Ours: lambda_min"],
                     [[r["name"], r["factor"], q["status"], f"{q['force_residual_rel']:.1e}", q["cone_violations"],
-                      shown(q["lambda_min_per_s2"], ".3g"), f"{q['seconds']:.1f}", f"{r['seconds']:.2f}",
+                      shown(q["lambda_min_per_s2"], ".3g"), f"{q['solve_cpu_seconds']:.1f}", f"{r['solve_cpu_seconds']:.2f}",
                       f"{r['force_residual_rel']:.1e}", shown(r["lambda_min_per_s2"], ".3g")] for r in rows for q in [r["reference"]]])
 
 
@@ -351,26 +465,39 @@ def main():
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", default=",".join(CASES))
     parser.add_argument("--time-budget", type=float, default=60.0)
+    parser.add_argument("--resimulate", action="store_true")
     parser.add_argument("--range", default="")
-    parser.add_argument("--reference", type=float, default=0.0)
+    parser.add_argument("--sweep", default="")
+    parser.add_argument("--growth", action="store_true")
+    parser.add_argument("--reference", default="")
+    parser.add_argument("--reference-seconds", type=float, default=60.0)
     parser.add_argument("--materials", type=Path, nargs="*", default=[])
     parser.add_argument("--table", type=Path)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    rows, fabrics = [], []
+    rows, fabrics, sizes = [], [], []
+    for columns, count in GROWTH if options.growth else []:  # first, while no child has used more memory
+        sizes.append(kept(options.out / f"growth-{columns * count}.answer.json", lambda: grow(options.program, columns, count, options)))
+        print(growth_rows(sizes[-1:]).splitlines()[-1], flush=True)
     for name in filter(None, options.only.split(",")):
         rows.append(run(options.program, name, options))
         print(case_table(rows[-1:]).splitlines()[-1], flush=True)
     for material in options.materials:
         for name in FABRIC_TARGETS:
-            fabrics.append(run_fabric(options.program, name, material, options))
+            fabrics.append(kept(options.out / f"{name}-{material.stem}.answer.json",
+                                lambda: run_fabric(options.program, name, material, options)))
             print(fabric_table(fabrics[-1:]).splitlines()[-1], flush=True)
     parts = [(rows, "## The cases of [Inv18]", case_table),
+             ([r for r in rows if "still" in r], "## Resimulated", resimulation_table),
              ([r for r in rows if "range" in r], "## Feasible range", range_table),
-             (rows if options.reference else [], "## The algorithm of [Inv18] on the same problems", reference_table),
+             (sizes, "## Growth", growth_table),
+             ([r for r in rows if "sweep" in r], "## Softer and softer", sweep_table),
+             ([r for r in rows if "reference" in r], "## The algorithm of [Inv18] on the same problems", reference_table),
              (fabrics, "## Fitted cloth", fabric_table)]
     if options.table:
-        options.table.write_text("\n".join(f"{title}\n{form(r)}" for r, title, form in parts if r), encoding="utf-8")
+        before = options.table.read_text(encoding="utf-8").split(MARKER)[0]
+        tables = "\n".join(f"{title}\n{form(r)}" for r, title, form in parts if r)
+        options.table.write_text(before + MARKER + "\n\n" + tables, encoding="utf-8")
 
 
 if __name__ == "__main__":

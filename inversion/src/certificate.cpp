@@ -25,7 +25,7 @@ constexpr double kNoForce = 1e-12;
 constexpr double kFarOutside = -1e9;
 /// Re-drapings converge to this, of a vertex's mean weight.
 constexpr double kRedrapeForce = 1e-7;
-constexpr int kRedrapeIterations = 60;
+constexpr int kRedrapeIterations = 200;
 
 double marginOf(const Vec3& force, const Contact& contact, double weight) {
   if (force.norm() <= kNoForce * weight) return 1.0;

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <utility>
 
 #include "contact_forces.h"
@@ -17,8 +18,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// With room to spare first, then on the cones' borders.
-constexpr std::array kMargins{ConeMargin{0.975, 0.02}, ConeMargin{0.9999, 1e-4}};
+/// With room for what may come first, then as [Inv18] sec. 7.2, then on the cones' borders.
+constexpr std::array kMargins{ConeMargin{0.9, 0.3}, ConeMargin{0.975, 0.02},
+                              ConeMargin{0.9999, 1e-4}};
 /// Of the load's steps, when all of it at once is too much.
 constexpr double kLoadShrink = 0.25, kLoadGrowth = 1.5, kLeastLoadStep = 0.01;
 constexpr int kMaxChoices = 5;
@@ -42,11 +44,11 @@ class Inverter {
       forgetRest();
       margin_ = margin;
       raiseLoad(*contact_forces);
-      if (stopped() || problem_.contacts.empty() || load_ > 0.0) break;
+      const bool stable = load_ >= 1.0 && makeStable();
+      if (stable || stopped() || problem_.contacts.empty()) break;
+      // Room is given up for stability and for more load, the last of it only to balance at all.
+      if (&margin != &kMargins.front() && load_ > 0.0) break;
     }
-    const bool all_held = problem_.fixed.size() + problem_.contacts.size() ==
-                          static_cast<std::size_t>(shell_.vertexCount());
-    if (load_ >= 1.0 && !all_held) makeStable();
     return finish();
   }
 
@@ -118,7 +120,9 @@ class Inverter {
     return o;
   }
 
-  void makeStable() {
+  bool makeStable() {
+    const std::size_t held = problem_.fixed.size() + problem_.contacts.size();
+    if (held == static_cast<std::size_t>(shell_.vertexCount())) return true;
     StabilizeOptions o;
     o.lambda_floor_per_s2 = kLambdaFloor_per_s2;
     o.margin = margin_;
@@ -127,6 +131,7 @@ class Inverter {
     o.progress = [this](int k, double l) { say("stability %.0f lambda_min %.4g", double(k), l); };
     const StabilizeResult r = stabilize(shell_, newton_, unknowns_, forces_, o);
     out_.factorizations += r.factorizations;
+    return r.stable;
   }
 
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
@@ -146,6 +151,7 @@ class Inverter {
     out_.rest = unknowns_.rest;
     out_.rotations = unknowns_.rotations;
     out_.contact_forces = newton_.contactForces(newton_.gradient(unknowns_, 1.0));
+    out_.solve_cpu_seconds = static_cast<double>(std::clock() - start_cpu_) / CLOCKS_PER_SEC;
     say("solved after %.3g s", seconds());
     CertificateOptions c;
     c.redrapes = options_.redrapes;
@@ -176,6 +182,7 @@ class Inverter {
   const InversionOptions& options_;
   InverseShell shell_;
   Clock::time_point start_ = Clock::now();
+  std::clock_t start_cpu_ = std::clock();
   RestNewton newton_{shell_, problem_.target.positions, problem_.fixed, problem_.contacts};
   ConeMargin margin_;
   RestUnknowns unknowns_;

@@ -158,6 +158,7 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
       {"proof", proofJson(result)},
       {"load_balanced", result.load_balanced},
       {"seconds", result.seconds},
+      {"solve_cpu_seconds", result.solve_cpu_seconds},
       {"factorizations", result.factorizations},
       {"provenance", provenance}};
   if (range != nullptr) out["range"] = rangeToJson(*range);

@@ -84,16 +84,17 @@ void RestNewton::findGauge() {
   motions_ = Eigen::MatrixXd::Zero(shell_.coordinateCount(), count);
   motions_.topRows(all.rows()) = all * svd.matrixV().rightCols(count);
   column_of_ = row_of_;
-  if (count > 0) {
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(motions_.transpose());
-    for (int k = 0; k < count; ++k)
-      column_of_[static_cast<std::size_t>(qr.colsPermutation().indices()[k])] = -1;
-  }
   coordinate_of_.clear();
-  for (std::size_t c = 0; c < column_of_.size(); ++c) {
-    if (column_of_[c] < 0) continue;
-    column_of_[c] = static_cast<int>(coordinate_of_.size());
-    coordinate_of_.push_back(static_cast<int>(c));
+  for (std::size_t c = 0; c < row_of_.size(); ++c)
+    if (row_of_[c] >= 0) coordinate_of_.push_back(static_cast<int>(c));
+  border_column_.clear();
+  if (count == 0) return;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(motions_.transpose());
+  for (int k = 0; k < count; ++k) {
+    const auto kept = static_cast<std::size_t>(qr.colsPermutation().indices()[k]);
+    border_column_.push_back(row_of_[kept]);
+    coordinate_of_[static_cast<std::size_t>(row_of_[kept])] = -1;
+    column_of_[kept] = -1;
   }
 }
 
@@ -133,7 +134,7 @@ Points3 RestNewton::contactForces(const Eigen::VectorXd& gradient) const {
 
 Eigen::VectorXd RestNewton::residual(const RestUnknowns& u, const Points3& forces,
                                      double load) const {
-  Eigen::VectorXd r(static_cast<Eigen::Index>(coordinate_of_.size()) + motions_.cols());
+  Eigen::VectorXd r(static_cast<Eigen::Index>(coordinate_of_.size()));
   Eigen::VectorXd g = gradient(u, load);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     g.segment<3>(3 * contacts_[i].vertex) -= forces.col(static_cast<Eigen::Index>(i));
@@ -158,15 +159,14 @@ bool RestNewton::factorize(const RestUnknowns& u, double load) {
       square_sum += it.value() * place * it.value() * place;
     }
   }
-  const int first = static_cast<int>(coordinate_of_.size());
   for (const Contact& c : contacts_)
     for (int a = 0; a < 3; ++a)
       for (int k = 0; k < border_.cols(); ++k)
-        entries.emplace_back(row_of_[static_cast<std::size_t>(3 * c.vertex + a)], first + k,
+        entries.emplace_back(row_of_[static_cast<std::size_t>(3 * c.vertex + a)], border_column_[k],
                              -border_(3 * c.vertex + a, k));
   rounding_ =
       kRounding * std::numeric_limits<double>::epsilon() * std::sqrt(square_sum) / weight_N_;
-  const int n = first + static_cast<int>(border_.cols());
+  const int n = static_cast<int>(coordinate_of_.size());
   Eigen::SparseMatrix<double> square(n, n);
   square.setFromTriplets(entries.begin(), entries.end());
   return lu_.factorize(square);
@@ -178,6 +178,7 @@ void RestNewton::move(RestUnknowns& u, Points3& forces, const Eigen::VectorXd& s
   Points3 displacement = Points3::Zero(3, pose_.cols());
   for (std::size_t k = 0; k < coordinate_of_.size(); ++k) {
     const Eigen::Index c = coordinate_of_[k];
+    if (c < 0) continue;
     const double d = share * step[static_cast<Eigen::Index>(k)];
     if (c < positions)
       displacement.data()[c] = d;
@@ -185,7 +186,7 @@ void RestNewton::move(RestUnknowns& u, Points3& forces, const Eigen::VectorXd& s
       u.rotations[c - positions] += d;
   }
   u.rest = path_.moved(u.rest, displacement);
-  const Eigen::VectorXd moved = border_ * (share * step.tail(border_.cols()));
+  const Eigen::VectorXd moved = border_ * (share * step(border_column_));
   for (std::size_t i = 0; i < contacts_.size() && border_.cols() > 0; ++i)
     forces.col(static_cast<Eigen::Index>(i)) += moved.segment<3>(3 * contacts_[i].vertex);
 }
@@ -196,7 +197,9 @@ bool RestNewton::plausible(const Points3& rest) const {
 }
 
 double RestNewton::lengthOf(const Eigen::VectorXd& step) const {
-  return step.head(static_cast<Eigen::Index>(coordinate_of_.size())).norm();
+  Eigen::VectorXd positions = step;
+  positions(border_column_).setZero();
+  return positions.norm();
 }
 
 RestNewtonResult RestNewton::solve(RestUnknowns& u, Points3& forces, double load,
@@ -274,10 +277,10 @@ std::vector<HoldDerivative> RestNewton::derivatives(const RestUnknowns& u, const
   if (!factorize(u, 1.0)) return out;
   const auto& j = gradientByRest(u, 1.0);
   for (Eigen::Index k = 0; k < by_unknowns.cols(); ++k) {
-    Eigen::VectorXd rhs =
-        Eigen::VectorXd::Zero(static_cast<Eigen::Index>(coordinate_of_.size()) + border_.cols());
+    Eigen::VectorXd rhs = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(coordinate_of_.size()));
     for (std::size_t c = 0; c < coordinate_of_.size(); ++c)
-      rhs[static_cast<Eigen::Index>(c)] = by_unknowns(coordinate_of_[c], k);
+      if (coordinate_of_[c] >= 0)
+        rhs[static_cast<Eigen::Index>(c)] = by_unknowns(coordinate_of_[c], k);
     Eigen::VectorXd rows;
     if (!lu_.solveTransposed(rhs, rows)) return {};
     Eigen::VectorXd adjoint = Eigen::VectorXd::Zero(shell_.coordinateCount());

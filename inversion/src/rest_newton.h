@@ -94,7 +94,8 @@ class RestNewton {
   RestPath path_;
   double rounding_ = 0.0;                ///< Force that is zero but for rounding, of the weight.
   std::vector<int> row_of_, column_of_;  ///< Of each coordinate of the shell; -1: left out.
-  std::vector<int> coordinate_of_;       ///< Of each column before the border.
+  std::vector<int> coordinate_of_;       ///< Of each column; -1: of the border.
+  std::vector<int> border_column_;       ///< Columns of kept coordinates, which the border takes.
   Eigen::MatrixXd border_;               ///< Coordinates x border columns [N].
   Eigen::MatrixXd motions_;              ///< Rigid motions that nothing fixed stops, by coordinate.
   SparseLu lu_;

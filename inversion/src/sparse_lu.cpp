@@ -13,7 +13,13 @@ struct SparseLu::Impl {
   void* numeric = nullptr;
   Eigen::SparseMatrix<double> matrix;
 
-  Impl() { umfpack_di_defaults(control.data()); }
+  Impl() {
+    umfpack_di_defaults(control.data());
+    // Rows and columns of one vertex have the same neighbours: pivots may stay on the diagonal, and
+    // nested dissection fills a surface's factors least.
+    control[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;
+    control[UMFPACK_ORDERING] = UMFPACK_ORDERING_METIS;
+  }
   ~Impl() {
     umfpack_di_free_numeric(&numeric);
     umfpack_di_free_symbolic(&symbolic);
