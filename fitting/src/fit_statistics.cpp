@@ -162,6 +162,13 @@ FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<F
     if (by_law || test.chi2_per_dof > kMissedByLaw) noise += disagreement(test, information);
   }
   statistics.covariance = covarianceOf(inverse, noise);
+  // What rests on its bound holds still for the others, but is itself no better known for it.
+  const std::vector<bool> none(statistics.at_bound.size(), false);
+  if (statistics.at_bound != none) {
+    const Eigen::MatrixXd all = covarianceOf(inverseOfFree(equations, none), noise);
+    for (Eigen::Index i = 0; i < all.rows(); ++i)
+      if (statistics.at_bound[i]) statistics.covariance(i, i) = all(i, i);
+  }
   return statistics;
 }
 

@@ -40,11 +40,11 @@ struct TestInformation {
 };
 
 /// What the data say about z at the optimum (docs/fitting.md). Entries at their bound are held
-/// there.
+/// there for the others; their own variance is that without the bound.
 struct FitStatistics {
   std::vector<TestInformation> tests;
   std::vector<bool> at_bound;  ///< Of each entry of z.
-  Eigen::MatrixXd covariance;  ///< Of z; zero at bounds. Misfit beyond the noise widens it, test by
+  Eigen::MatrixXd covariance;  ///< Of z. Misfit beyond the noise widens it, test by
                                ///< test, and so does disagreement between runs of frames.
 };
 

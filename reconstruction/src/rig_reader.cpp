@@ -175,8 +175,7 @@ void RigReader::addTable(ClothFrame& cloth, Reading& reading) const {
     const double along = table.push.dot(rest_.mesh.positions.col(i)) + push;
     if (along > edge + kOnEdge_m) continue;
     clip.clamped_vertices.push_back(i);
-    if (cloth.states[i] == PointState::kValid) continue;
-    // Hidden or beyond an image: it lies on the table as it did, pushed with the rest.
+    // Seen or hidden, it lies on the table as it did, pushed with the rest.
     const Vec3 at = rest_.mesh.positions.col(i) + push * table.push;
     cloth.positions_m.col(i) = at;
     const Mat3 own = rest_.vertices[i].state == PointState::kValid
