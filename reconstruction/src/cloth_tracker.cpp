@@ -170,6 +170,7 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
     frame.views[i] = 0;
     if (frame.states[i] == PointState::kValid) frame.states[i] = PointState::kNotFound;
   }
+  const double beyond = 1.0 - 1.0 / (s.surface.inflation * s.surface.inflation);
   for (std::size_t v = 0; v < s.views.size(); ++v) {
     TrackedView& view = s.tracked[v];
     if (!view.tracker || images[v].width == 0) continue;
@@ -193,8 +194,11 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
       const Mat2 linear = warp.linear();
       const Mat2& rest =
           s.surface.vertices[vertex].sightings[view.places[i]].sighting.covariance_px2;
-      seen[vertex].push_back({static_cast<int>(v), point.position + warp.displacement(),
-                              point.match.covariance_px2 + linear * rest * linear.transpose()});
+      // The match's covariance holds the noise of the image at rest already, and with the other
+      // sign that moved the sighting at rest: only what that errs beyond its matches comes on top.
+      seen[vertex].push_back(
+          {static_cast<int>(v), point.position + warp.displacement(),
+           point.match.covariance_px2 + beyond * linear * rest * linear.transpose()});
       places[vertex].push_back(view.places[i]);
       frame.zncc[vertex] = std::min(frame.zncc[vertex], static_cast<float>(point.match.zncc));
     }
