@@ -117,7 +117,7 @@ Result<void> checkRepeats(const SheetGrid& grid, const SheetHeights& heights,
 
 void judgeResiduals(const std::vector<CameraView>& views, RestSurface& surface) {
   const ViewOffsets offsets(views, surface.vertices);
-  surface.offset_px = offsets.offset_px();
+  surface.offset_px = offsets.offsetPx();
   std::vector<double> residuals, ratios;
   for (const RestVertex& vertex : surface.vertices) {
     if (vertex.state != PointState::kValid) continue;

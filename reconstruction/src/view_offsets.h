@@ -13,7 +13,7 @@ class ViewOffsets {
 
   /// Standard deviation per axis of offsets that leave these linear parts; three of a vertex's
   /// numbers went into its place.
-  double offset_px() const { return offset_px_; }
+  double offsetPx() const { return offset_px_; }
   /// Of a valid vertex: sum of squared residuals, linear parts taken out, over their covariance.
   double chi2(const RestVertex& vertex) const;
 

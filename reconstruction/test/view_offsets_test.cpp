@@ -57,7 +57,7 @@ TEST(ViewOffsetsTest, TellOffsetsFromNoise) {
         off.push_back(offset_px * Vec2(normal(random), normal(random)));
       const std::vector<RestVertex> vertices = sheet(views, off, random);
       const ViewOffsets found(views, vertices);
-      squares += found.offset_px() * found.offset_px() / kDraws;
+      squares += found.offsetPx() * found.offsetPx() / kDraws;
       for (const RestVertex& vertex : vertices)
         chi2 += found.chi2(vertex) / static_cast<double>(vertices.size() * kDraws);
     }
