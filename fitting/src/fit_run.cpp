@@ -271,10 +271,11 @@ bool FitRun::refineBlock(const FitBlock& block, int pass) {
     if (evaluator_.cancelled()) return true;
     reweigh(block.tests);
   }
-  // What the early frames and the first curves missed was not all the law's.
-  if (pass >= 1)
+  if (pass == 1) {
+    // What the early frames and the first curves missed was not all the law's.
     for (const int t : block.tests) tests_[t]->updateDiscrepancy();
-  if (pass == 1) reconsiderShapes(block);
+    reconsiderShapes(block);
+  }
   return solve(block.groups, block.tests, 0, tight, "all frames");
 }
 
