@@ -20,6 +20,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "docs/formats/python"))
+from read_material import read_material, stiffness  # noqa: E402
 from read_measurement import read_measurement  # noqa: E402
 
 PROTOCOLS = ["stretch-weft", "stretch-warp", "shear", "bend-weft", "bend-warp", "complex-shear", "corner-pull"]
@@ -125,20 +126,6 @@ def row(protocol, options, folder):
     return "| " + " | ".join(cells) + " |", error <= LIMIT_M
 
 
-def stiffness(component, strain):
-    """Of a curve at a strain: cubic Hermite between its knots, constant beyond."""
-    knots = component["knots"]
-    if strain <= knots[0]["strain"]:
-        return knots[0]["stiffness"]
-    for a, b in zip(knots, knots[1:]):
-        if strain <= b["strain"]:
-            h = b["strain"] - a["strain"]
-            t = (strain - a["strain"]) / h
-            return ((2 * t**3 - 3 * t**2 + 1) * a["stiffness"] + (t**3 - 2 * t**2 + t) * h * a["tangent"]
-                    + (3 * t**2 - 2 * t**3) * b["stiffness"] + (t**3 - t**2) * h * b["tangent"])
-    return knots[-1]["stiffness"]
-
-
 def band(component, strain):
     """Half a 95 % band, linear between knots; None where a knot beside it is not observed."""
     knots = component["knots"]
@@ -156,7 +143,7 @@ def compare_materials(folder):
     for name, place in (("images", "{}-measurement"), ("truth", "{}-truth/exact")):
         made(f"{name}-material.json", "fit", *[place.format(p) for p in FITTED], "--model", "stvk", "--variant", "orthotropic",
              "--max-knots", "2", "-o", f"{name}-material.json", folder=folder)
-        fits[name] = {c["name"]: c for c in json.loads((folder / f"{name}-material.json").read_text())["components"]}
+        fits[name] = {c["name"]: c for c in read_material(folder / f"{name}-material.json")["components"]}
     rows = []
     for name, seen in fits["images"].items():
         for knot in seen["knots"]:

@@ -9,6 +9,7 @@
 #include "camera_graph.h"
 #include "held_out.h"
 #include "single_camera.h"
+#include "tenter/calib/calibration_parameters.h"
 #include "verdict.h"
 
 namespace tenter {
@@ -192,31 +193,23 @@ void moveToRigOrigin(const Bundle& bundle, int set, Eigen::MatrixXd& covariance)
   covariance = change * covariance * change.transpose();
 }
 
-void namePose(const std::string& name, CameraCalibration& c) {
-  for (const char* part : {".rotation_rad", ".translation_m"}) {
-    for (const char* axis : {"[0]", "[1]", "[2]"}) c.parameters.push_back(name + part + axis);
-  }
-}
-
-void nameParameters(const Work& w, CameraCalibration& c) {
-  static constexpr const char* kLens[] = {"fx_px", "fy_px", "cx_px", "cy_px", "k1",
-                                          "k2",    "p1",    "p2",    "k3"};
+void nameAllParameters(const Work& w, CameraCalibration& c) {
   for (std::size_t camera = 0; camera < w.photos.size(); ++camera) {
-    for (const char* term : kLens) c.parameters.push_back(w.photos[camera].name + "." + term);
-    if (camera > 0) namePose(w.photos[camera].name, c);
+    nameParameters(w.photos[camera].name, kLensParameters, c.parameters);
+    if (camera > 0) nameParameters(w.photos[camera].name, kPoseParameters, c.parameters);
   }
   if (w.fit.fit_warp) {
     c.parameters.emplace_back("board.warp_m[0]");
     c.parameters.emplace_back("board.warp_m[1]");
   }
-  if (w.fit.rig_set >= 0) namePose(std::string(kRigPose), c);
+  if (w.fit.rig_set >= 0) nameParameters(std::string(kRigPose), kPoseParameters, c.parameters);
 }
 
 void addUncertainty(Work& w, CameraCalibration& c) {
   w.fit.rig_set = rigSet(w);
   BundleCovariance covariance = bundleCovariance(w.bundle, w.fit);
   if (!covariance.observable) return;
-  nameParameters(w, c);
+  nameAllParameters(w, c);
   c.covariance = std::move(covariance.matrix);
   if (w.fit.rig_set >= 0) moveToRigOrigin(w.bundle, w.fit.rig_set, c.covariance);
   c.quality.noise_px = covariance.noise_px;

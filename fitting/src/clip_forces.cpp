@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "tenter/core/cross_matrix.h"
+
 namespace tenter {
 namespace {
 
@@ -35,12 +37,6 @@ Mat6 cordCovariance(const CordReading& cord, const Vec3& place) {
     covariance += turned * turned.transpose();
   }
   return covariance;
-}
-
-Mat3 crossMatrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
 }
 
 Vec3 centreOfClip(const SolvedFrame& solved, int clip) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tag_detector.h"
+#include "tenter/core/cross_matrix.h"
 
 namespace tenter {
 
@@ -21,12 +22,6 @@ constexpr double kLoss_px = 0.3, kStray_px = 1.5;
 /// A clip whose corners disagree by more is not believed [px RMS].
 constexpr double kLargestResidual_px = 1.0;
 constexpr std::size_t kLeastCorners = 8;
-
-Mat3 crossMatrix(const Vec3& v) {
-  Mat3 m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
 
 /// The pose after a small turn about `pivot` and a displacement.
 Eigen::Isometry3d moved(const Eigen::Isometry3d& pose, const Vec6& step, const Vec3& pivot) {

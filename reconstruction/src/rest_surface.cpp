@@ -187,28 +187,29 @@ Mat3 RestSurface::systematicAt(int vertex, const Vec3& position_m,
                                std::span<const Sighting> sightings, const Mat3& gradient) const {
   if (!systematic) return Mat3::Zero();
   const SystematicError::PlaceRows now = systematic->placeByParameters(position_m, sightings);
-  if (vertices[vertex].state != PointState::kValid) return systematic->covarianceOf(now);
-  const SystematicError::PlaceRows at_rest =
-      systematic->placeByParameters(mesh.positions.col(vertex), sightingsOf(vertex));
+  const SystematicError::PlaceRows& at_rest = vertices[vertex].by_parameters;
+  if (at_rest.cols() == 0) return systematic->covarianceOf(now);
   return systematic->covarianceOf(now - gradient * at_rest);
 }
 
 void addSystematicError(const CameraCalibration* calibration, const std::vector<CameraView>& views,
                         RestSurface& surface) {
-  if (calibration != nullptr) {
-    if (auto stated = SystematicError::ofCalibration(*calibration, views)) {
-      surface.systematic = std::make_shared<const SystematicError>(std::move(*stated));
-      return;
-    }
+  auto stated = calibration != nullptr ? SystematicError::ofCalibration(*calibration, views)
+                                       : std::optional<SystematicError>();
+  if (!stated) {
+    stated = SystematicError::ofOffsets(views, surface.offset_px);
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "the calibration does not state its covariance: sigma goes by how far the views "
+                  "disagree, %.3f px",
+                  surface.offset_px);
+    surface.warnings.emplace_back(text);
   }
-  surface.systematic =
-      std::make_shared<const SystematicError>(SystematicError::ofOffsets(views, surface.offset_px));
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "the calibration does not state its covariance: sigma goes by how far the views "
-                "disagree, %.3f px",
-                surface.offset_px);
-  surface.warnings.emplace_back(text);
+  surface.systematic = std::make_shared<const SystematicError>(std::move(*stated));
+  for (int i = 0; i < static_cast<int>(surface.vertices.size()); ++i)
+    if (surface.vertices[i].state == PointState::kValid)
+      surface.vertices[i].by_parameters = surface.systematic->placeByParameters(
+          surface.mesh.positions.col(i), surface.sightingsOf(i));
 }
 
 Result<RestSurface> findSurface(const std::vector<CameraView>& views,

@@ -72,6 +72,13 @@ RigReader::RigReader(const ImageSession& session, const RestSurface& rest,
   }
 }
 
+/// Of a vertex that moved rigidly from where it was seen at rest; zero where it was not.
+Mat3 RigReader::carriedCovariance(int vertex, const Vec3& at, const Mat3& turn) const {
+  if (rest_.vertices[vertex].state != PointState::kValid) return Mat3::Zero();
+  return rest_.vertices[vertex].point.covariance_m2 +
+         rest_.systematicAt(vertex, at, rest_.sightingsOf(vertex), turn * alongRest());
+}
+
 void RigReader::hold(const MountedClip& clip, const ClipPose& pose, Reading& reading) const {
   const auto index =
       static_cast<std::size_t>(std::find_if(tagged_.begin(), tagged_.end(),
@@ -86,14 +93,10 @@ void RigReader::hold(const MountedClip& clip, const ClipPose& pose, Reading& rea
     const Vec3 rest = rest_.mesh.positions.col(vertex);
     const double sigma =
         std::hypot(pose.position_sigma_m, pose.rotation_sigma_rad * (rest - middle).norm());
-    const Mat3 own =
-        rest_.vertices[vertex].state == PointState::kValid
-            ? Mat3(rest_.vertices[vertex].point.covariance_m2 +
-                   rest_.systematicAt(vertex, pose.rig_from_clip * rest, rest_.sightingsOf(vertex),
-                                      pose.rig_from_clip.linear() * alongRest()))
-            : Mat3(Mat3::Zero());
-    reading.held.push_back(
-        {vertex, pose.rig_from_clip * rest, sigma * sigma * Mat3::Identity() + own});
+    const Vec3 at = pose.rig_from_clip * rest;
+    reading.held.push_back({vertex, at,
+                            sigma * sigma * Mat3::Identity() +
+                                carriedCovariance(vertex, at, pose.rig_from_clip.linear())});
   }
   reading.clip_position_sigma_m = std::max(reading.clip_position_sigma_m, pose.position_sigma_m);
   reading.clip_rotation_sigma_rad =
@@ -175,14 +178,13 @@ void RigReader::addTable(ClothFrame& cloth, Reading& reading) const {
     const double along = table.push.dot(rest_.mesh.positions.col(i)) + push;
     if (along > edge + kOnEdge_m) continue;
     clip.clamped_vertices.push_back(i);
-    // Seen or hidden, it lies on the table as it did, pushed with the rest.
+    // Seen or hidden, it lies on the table as it did, pushed with the rest. One that was not seen
+    // at rest either stays what it is: filled.
     const Vec3 at = rest_.mesh.positions.col(i) + push * table.push;
     cloth.positions_m.col(i) = at;
-    const Mat3 own = rest_.vertices[i].state == PointState::kValid
-                         ? rest_.vertices[i].point.covariance_m2
-                         : Mat3(Mat3::Zero());
-    cloth.covariances_m2[i] = scatter * scatter * Mat3::Identity() + own +
-                              rest_.systematicAt(i, at, rest_.sightingsOf(i), alongRest());
+    if (rest_.vertices[i].state != PointState::kValid) continue;
+    cloth.covariances_m2[i] =
+        scatter * scatter * Mat3::Identity() + carriedCovariance(i, at, Mat3::Identity());
     cloth.states[i] = PointState::kValid;
   }
   // The sample's outline in its plane, cut at the edge, then in material coordinates.

@@ -35,6 +35,7 @@ class RigReader {
   Branch branchBetween(const SessionMoment* before, const SessionMoment& now) const;
 
  private:
+  Mat3 carriedCovariance(int vertex, const Vec3& at, const Mat3& turn) const;
   void hold(const MountedClip& clip, const ClipPose& pose, Reading& reading) const;
   void readCord(const MountedCord& cord, const std::vector<GrayImage>& images,
                 const SessionMoment& moment, Reading& reading) const;

@@ -7,12 +7,13 @@
 #include <array>
 #include <string>
 
+#include "tenter/calib/calibration_parameters.h"
+#include "tenter/core/cross_matrix.h"
+
 namespace tenter {
 
 namespace {
 
-constexpr std::array<const char*, 9> kLensNames{"fx_px", "fy_px", "cx_px", "cy_px", "k1",
-                                                "k2",    "p1",    "p2",    "k3"};
 /// Of a term's standard deviation, for central differences.
 constexpr double kStep = 0.1;
 
@@ -31,14 +32,14 @@ double& lensTerm(Lens& lens, int term) {
   }
 }
 
-Mat3 cross(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
-Eigen::Index rowOf(const std::vector<std::string>& names, const std::string& name) {
-  const auto found = std::find(names.begin(), names.end(), name);
+/// First of the rows that are named "of.term" in order, searched from the end if `last`; -1: none.
+template <std::size_t count>
+Eigen::Index rowsOf(const std::vector<std::string>& names, const std::string& of,
+                    const std::array<const char*, count>& terms, bool last = false) {
+  std::vector<std::string> wanted;
+  nameParameters(of, terms, wanted);
+  const auto found = last ? std::find_end(names.begin(), names.end(), wanted.begin(), wanted.end())
+                          : std::search(names.begin(), names.end(), wanted.begin(), wanted.end());
   return found == names.end() ? -1 : static_cast<Eigen::Index>(found - names.begin());
 }
 
@@ -55,11 +56,11 @@ std::optional<SystematicError> SystematicError::ofCalibration(
     if (camera == nullptr) return std::nullopt;
     View out(view);
     out.camera_from_world = camera->camera_from_world;
-    out.lens = rowOf(calibration.parameters, view.name + "." + kLensNames[0]);
-    if (out.lens < 0 || out.lens + kLensTerms > size) return std::nullopt;
+    out.lens = rowsOf(calibration.parameters, view.name, kLensParameters);
+    if (out.lens < 0) return std::nullopt;
     if (camera != &calibration.cameras.front()) {
-      out.pose = rowOf(calibration.parameters, view.name + ".rotation_rad[0]");
-      if (out.pose < 0 || out.pose + 6 > size) return std::nullopt;
+      out.pose = rowsOf(calibration.parameters, view.name, kPoseParameters);
+      if (out.pose < 0) return std::nullopt;
     }
     for (int term = 0; term < kLensTerms; ++term) {
       const double sigma = std::sqrt(calibration.covariance(out.lens + term, out.lens + term));
@@ -79,9 +80,7 @@ std::optional<SystematicError> SystematicError::ofCalibration(
   if (calibration.rig) {
     error.world_from_rig_ = calibration.rig->rig_from_world.inverse();
     // The last of that name: a camera may be called so too.
-    const std::string first = std::string(kRigPose) + ".rotation_rad[0]";
-    if (size >= 6 && calibration.parameters[static_cast<std::size_t>(size - 6)] == first)
-      error.rig_ = size - 6;
+    error.rig_ = rowsOf(calibration.parameters, std::string(kRigPose), kPoseParameters, true);
   }
   return error;
 }
@@ -116,12 +115,12 @@ bool SystematicError::pixelByParameters(const View& view, const Vec3& point_m,
   }
   const Mat3 turn = view.camera_from_world.linear();
   if (view.pose >= 0) {
-    rows.middleCols<3>(view.pose) = -jacobian * cross(turn * world);
+    rows.middleCols<3>(view.pose) = -jacobian * crossMatrix(turn * world);
     rows.middleCols<3>(view.pose + 3) = jacobian;
   }
   if (rig_ >= 0) {
     const Vec3 arm = world - world_from_rig_->translation();
-    rows.middleCols<3>(rig_) = -jacobian * turn * cross(arm);
+    rows.middleCols<3>(rig_) = -jacobian * turn * crossMatrix(arm);
     rows.middleCols<3>(rig_ + 3) = jacobian * turn;
   }
   return true;

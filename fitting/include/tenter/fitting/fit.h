@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -52,7 +53,8 @@ struct TestResidual {
       0.0;  ///< rms of the stacked clip-force errors / largest clip force; axial for a strip.
   double position_rms_m = 0.0;  ///< NaN without positions.
   double chi2_per_dof = 0.0;
-  double discrepancy_m = 0.0;  ///< What the law misses of positions beyond their noise, per axis.
+  /// What the law misses of positions beyond their noise, per axis; NaN where no fit estimated it.
+  double discrepancy_m = std::numeric_limits<double>::quiet_NaN();
   int unconverged_frames = 0, unstable_frames = 0, multistable_frames = 0;
 };
 

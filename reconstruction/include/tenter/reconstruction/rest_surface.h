@@ -31,6 +31,8 @@ struct RestVertex {
   SpacePoint point;                       ///< If valid.
   std::vector<VertexSighting> sightings;  ///< The views that show it; at least two if valid.
   double zncc = 0.0;                      ///< Least of those between views.
+  /// Of its place at rest, where a systematic error is known (RestSurface::systematic).
+  SystematicError::PlaceRows by_parameters;
 };
 
 /// The surface at rest and what is needed to follow it.

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "tenter/calib/calibration_parameters.h"
 #include "tenter/reconstruction/triangulate.h"
 
 namespace tenter {
@@ -32,7 +33,7 @@ class SystematicError {
   }
 
  private:
-  static constexpr int kLensTerms = 9;  ///< fx fy cx cy k1 k2 p1 p2 k3.
+  static constexpr int kLensTerms = kLensParameters.size();
   struct View {
     explicit View(const CameraView& seen_by) : view(seen_by) {}
     CameraView view;
