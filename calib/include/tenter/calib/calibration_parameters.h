@@ -12,9 +12,9 @@ namespace tenter {
 /// (docs/formats/camera-calibration.md).
 inline constexpr std::array<const char*, 9> kLensParameters{
     "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"};
-inline constexpr std::array<const char*, 6> kPoseParameters{
-    "rotation_rad[0]",  "rotation_rad[1]",  "rotation_rad[2]",
-    "translation_m[0]", "translation_m[1]", "translation_m[2]"};
+inline constexpr std::array<const char*, 6> kPoseParameters{"rotation_rad[0]",  "rotation_rad[1]",
+                                                            "rotation_rad[2]",  "translation_m[0]",
+                                                            "translation_m[1]", "translation_m[2]"};
 
 /// Appends "of.term" for each of them.
 template <std::size_t count>
