@@ -65,6 +65,9 @@ struct ClothTracker::State {
         carried(rest.mesh) {}
 
   Result<void> prepare(const std::vector<GrayImage>& images);
+  Result<void> follow(std::size_t v, const GrayImage& image,
+                      std::vector<std::vector<Sighting>>& seen,
+                      std::vector<std::vector<std::size_t>>& places, ClothFrame& frame);
   void locate(int vertex, std::vector<Sighting>& seen, std::vector<std::size_t>& places,
               ClothFrame& frame) const;
 };
@@ -102,6 +105,42 @@ Result<void> ClothTracker::State::prepare(const std::vector<GrayImage>& images) 
         PointTracker::create(images[v], std::move(points), options.correlate, std::move(centres));
     if (!tracker) return tracker.error();
     view.tracker.emplace(std::move(*tracker));
+  }
+  return {};
+}
+
+/// Finds a view's subsets in its next image and adds what it shows to the vertices' sightings.
+Result<void> ClothTracker::State::follow(std::size_t v, const GrayImage& image,
+                                         std::vector<std::vector<Sighting>>& seen,
+                                         std::vector<std::vector<std::size_t>>& places,
+                                         ClothFrame& frame) {
+  TrackedView& view = tracked[v];
+  const auto field = view.tracker->track(image);
+  if (!field) {
+    Error error = field.error();
+    error.place = views[v].name;
+    return error;
+  }
+  for (const std::string& warning : field->warnings) {
+    frame.warnings.push_back(views[v].name + ": " + warning);
+  }
+  // A match's covariance holds the noise of the image at rest already, and with the other sign that
+  // moved the sighting at rest: only what that errs beyond its matches comes on top.
+  const double beyond = 1.0 - 1.0 / (surface.inflation * surface.inflation);
+  for (std::size_t i = 0; i < view.vertices.size(); ++i) {
+    const CorrelatedPoint& point = field->points[i];
+    const int vertex = view.vertices[i];
+    if (!point.valid()) {
+      if (seen[vertex].empty()) frame.states[vertex] = point.state;
+      continue;
+    }
+    const SubsetWarp& warp = point.match.warp;
+    const Mat2 linear = warp.linear();
+    const Mat2& rest = surface.vertices[vertex].sightings[view.places[i]].sighting.covariance_px2;
+    seen[vertex].push_back({static_cast<int>(v), point.position + warp.displacement(),
+                            point.match.covariance_px2 + beyond * linear * rest * linear.transpose()});
+    places[vertex].push_back(view.places[i]);
+    frame.zncc[vertex] = std::min(frame.zncc[vertex], static_cast<float>(point.match.zncc));
   }
   return {};
 }
@@ -170,38 +209,10 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
     frame.views[i] = 0;
     if (frame.states[i] == PointState::kValid) frame.states[i] = PointState::kNotFound;
   }
-  const double beyond = 1.0 - 1.0 / (s.surface.inflation * s.surface.inflation);
   for (std::size_t v = 0; v < s.views.size(); ++v) {
-    TrackedView& view = s.tracked[v];
-    if (!view.tracker || images[v].width == 0) continue;
-    const auto field = view.tracker->track(images[v]);
-    if (!field) {
-      Error error = field.error();
-      error.place = s.views[v].name;
-      return error;
-    }
-    for (const std::string& warning : field->warnings) {
-      frame.warnings.push_back(s.views[v].name + ": " + warning);
-    }
-    for (std::size_t i = 0; i < view.vertices.size(); ++i) {
-      const CorrelatedPoint& point = field->points[i];
-      const int vertex = view.vertices[i];
-      if (!point.valid()) {
-        if (seen[vertex].empty()) frame.states[vertex] = point.state;
-        continue;
-      }
-      const SubsetWarp& warp = point.match.warp;
-      const Mat2 linear = warp.linear();
-      const Mat2& rest =
-          s.surface.vertices[vertex].sightings[view.places[i]].sighting.covariance_px2;
-      // The match's covariance holds the noise of the image at rest already, and with the other
-      // sign that moved the sighting at rest: only what that errs beyond its matches comes on top.
-      seen[vertex].push_back(
-          {static_cast<int>(v), point.position + warp.displacement(),
-           point.match.covariance_px2 + beyond * linear * rest * linear.transpose()});
-      places[vertex].push_back(view.places[i]);
-      frame.zncc[vertex] = std::min(frame.zncc[vertex], static_cast<float>(point.match.zncc));
-    }
+    if (!s.tracked[v].tracker || images[v].width == 0) continue;
+    auto followed = s.follow(v, images[v], seen, places, frame);
+    if (!followed) return followed.error();
   }
   parallelFor(count, s.options.correlate.threads, [&](std::size_t i, std::size_t) {
     s.locate(static_cast<int>(i), seen[i], places[i], frame);
