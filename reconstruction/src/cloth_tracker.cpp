@@ -137,8 +137,9 @@ Result<void> ClothTracker::State::follow(std::size_t v, const GrayImage& image,
     const SubsetWarp& warp = point.match.warp;
     const Mat2 linear = warp.linear();
     const Mat2& rest = surface.vertices[vertex].sightings[view.places[i]].sighting.covariance_px2;
-    seen[vertex].push_back({static_cast<int>(v), point.position + warp.displacement(),
-                            point.match.covariance_px2 + beyond * linear * rest * linear.transpose()});
+    seen[vertex].push_back(
+        {static_cast<int>(v), point.position + warp.displacement(),
+         point.match.covariance_px2 + beyond * linear * rest * linear.transpose()});
     places[vertex].push_back(view.places[i]);
     frame.zncc[vertex] = std::min(frame.zncc[vertex], static_cast<float>(point.match.zncc));
   }
