@@ -54,22 +54,25 @@ Result<std::unique_ptr<RigService>> RigService::start(RigConfig config) {
   auto events = std::make_shared<CellEvents>();
   LoadCellScannerOptions options;
   options.on_event = [events](const LoadCellEvent& event) { events->push(event); };
+  auto alarm = std::make_shared<ForceAlarm>(config.limits.absolute_N);
+  options.on_reading = [alarm](const LoadCellReading& reading) { alarm->look(reading); };
   auto scanner = LoadCellScanner::start(config.cells, options);
   if (!scanner) return scanner.error();
   auto section = parseCameraSection(config.text, "cameras");
   if (!section) return section.error();
   auto cameras = std::make_unique<CaptureService>(*std::move(section));
   return std::unique_ptr<RigService>(new RigService(std::move(config), *std::move(bank),
-                                                    std::move(events), *std::move(scanner),
-                                                    std::move(cameras)));
+                                                    std::move(events), std::move(alarm),
+                                                    *std::move(scanner), std::move(cameras)));
 }
 
 RigService::RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<CellEvents> events,
-                       std::unique_ptr<LoadCellScanner> scanner,
+                       std::shared_ptr<ForceAlarm> alarm, std::unique_ptr<LoadCellScanner> scanner,
                        std::unique_ptr<CaptureService> cameras)
     : config_(config),
       bank_(std::move(bank)),
       cell_events_(std::move(events)),
+      alarm_(std::move(alarm)),
       scanner_(std::move(scanner)),
       cameras_(std::move(cameras)),
       machine_(std::move(config)),
@@ -90,18 +93,16 @@ void RigService::watch() {
     const std::int64_t now_ns = monotonic_ns();
     for (std::size_t i = 0; i < config_.cells.size() && armed_; ++i) {
       const LoadCellReading reading = scanner_->reading(i);
-      const auto gross_N = reading.gross_N(now_ns);
-      const bool over = gross_N ? *gross_N > config_.limits.absolute_N
-                                : reading.faultAt(now_ns) == LoadCellFault::kOverRange;
-      if (!over) continue;
+      if (!alarm_->beyond(reading, now_ns)) continue;
       {
+        const double force_N = reading.gross_N(now_ns).value_or(config_.cells[i].capacity_N);
         const std::lock_guard lock(halt_mutex_);
-        trip_ = ForceTrip{static_cast<int>(i), gross_N.value_or(config_.cells[i].capacity_N)};
+        trip_ = ForceTrip{static_cast<int>(i), force_N};
         armed_ = false;
       }
       (void)haltEverything();
     }
-    std::this_thread::sleep_for(kWatchPeriod);
+    alarm_->wait(kWatchPeriod);
   }
 }
 
@@ -162,7 +163,7 @@ void RigService::loop(const std::function<void()>& each_tick) {
 
 void RigService::noteLateness(std::int64_t late_ns, std::int64_t now_ns) {
   ++ticks_;
-  worst_late_ns_ = std::max(worst_late_ns_, late_ns);
+  lateness_.add(late_ns);
   if (late_ns <= std::chrono::nanoseconds(kTick).count()) return;
   ++missed_;
   const std::string text = std::to_string(late_ns / 1000) + " us late";
@@ -452,7 +453,8 @@ void RigService::publish(const RigTick& tick) {
   status["loop"] = {{"ticks", ticks_},
                     {"overlong_calls", overlong_.load()},
                     {"missed", missed_},
-                    {"worst_late_ms", 1e-6 * static_cast<double>(worst_late_ns_)}};
+                    {"p99_late_ms", lateness_.quantile_ms(0.99)},
+                    {"worst_late_ms", lateness_.worst_ms()}};
   const std::lock_guard lock(status_mutex_);
   status_ = std::move(status);
 }

@@ -14,6 +14,8 @@
 
 #include "capture.h"
 #include "fault_names.h"
+#include "force_alarm.h"
+#include "lateness.h"
 #include "recorder.h"
 #include "tenter/rig/actuator_bank.h"
 #include "tenter/rig/load_cell_scanner.h"
@@ -21,8 +23,8 @@
 
 namespace tenter::daemon {
 
-/// Devices, state machine and recorder of one rig: a loop at 50 Hz, and a watch every 2 ms that
-/// halts all axes by itself when a force is beyond the absolute limit.
+/// Devices, state machine and recorder of one rig: a loop at 50 Hz, and a watch that halts all axes
+/// by itself as soon as a force is read beyond the absolute limit.
 class RigService {
  public:
   /// Opens USB and starts reading the cells; devices that are missing are looked for later.
@@ -55,7 +57,8 @@ class RigService {
   };
 
   RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<CellEvents> events,
-             std::unique_ptr<LoadCellScanner> scanner, std::unique_ptr<CaptureService> cameras);
+             std::shared_ptr<ForceAlarm> alarm, std::unique_ptr<LoadCellScanner> scanner,
+             std::unique_ptr<CaptureService> cameras);
   void tick();
   RigTick readAll();
   void noteFaults(const RigTick& tick);
@@ -81,6 +84,7 @@ class RigService {
   RigConfig config_;
   ActuatorBank bank_;
   std::shared_ptr<CellEvents> cell_events_;
+  std::shared_ptr<ForceAlarm> alarm_;
   std::unique_ptr<LoadCellScanner> scanner_;
   std::unique_ptr<CaptureService> cameras_;
   RigMachine machine_;
@@ -106,7 +110,7 @@ class RigService {
   nlohmann::json status_;
   std::uint64_t ticks_ = 0, missed_ = 0;
   std::atomic<std::uint64_t> overlong_{0};  ///< Calls beyond twice their time-out.
-  std::int64_t worst_late_ns_ = 0;
+  Lateness lateness_;
   unsigned arrivals_ = 0;
   std::int64_t next_reconnect_ns_ = 0;
   std::thread watch_;

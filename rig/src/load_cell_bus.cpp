@@ -86,6 +86,7 @@ void LoadCellBus::scanCell(Cell& cell) {
     ++reading.failures;
   }
   cell.snapshot.store(reading);
+  if (options_.on_reading) options_.on_reading(reading);
   const bool changed =
       reading.fault != cell.last.fault || reading.exception_code != cell.last.exception_code;
   cell.last = reading;

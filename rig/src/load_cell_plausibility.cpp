@@ -10,6 +10,8 @@ namespace {
 // not itself, is that twin: real loads hardly ever jump to just there within one scan.
 constexpr double kTwinNearness_N = 0.05;
 constexpr double kTwinNearness = 0.2;  // of the last weight
+// A slack cord reads a little below zero, and a moment later may be taut.
+constexpr double kSlack_N = 0.025;
 // Floats with exchanged words are mostly far too large or far too small. No amplifier resolves
 // this.
 constexpr double kSmallestWeight_N = 1e-6;
@@ -60,7 +62,8 @@ LoadCellFault LoadCellPlausibility::judgeValue(const DecodedWeights& weights) co
   const double gross_N = tension_N(weights.gross_N);
   const double swapped_N = tension_N(weights.swapped_gross_N);
   if (last_N_ && !isNear(gross_N, *last_N_)) {
-    if (isNear(-gross_N, *last_N_)) return LoadCellFault::kSignFlip;
+    const bool grown_taut = gross_N > 0.0 && *last_N_ > -kSlack_N;
+    if (isNear(-gross_N, *last_N_) && !grown_taut) return LoadCellFault::kSignFlip;
     if (isNear(swapped_N, *last_N_)) return LoadCellFault::kWordOrder;  // false for NaN
   }
   const bool tiny = gross_N != 0.0 && std::abs(gross_N) < kSmallestWeight_N;

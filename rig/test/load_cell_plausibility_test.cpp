@@ -68,6 +68,20 @@ TEST_F(PlausibilityTest, AFlippedSignIsNamedAndProbationFollows) {
   believe(3.0);
 }
 
+TEST_F(PlausibilityTest, ACordThatGrowsTautFromAReadingBelowZeroIsBelieved) {
+  for (const double slack_N : {-0.005, -0.012, -0.024}) {
+    for (const double taut_N : {0.045, 0.05, 0.055, 0.06, 0.07}) {
+      plausibility_ = LoadCellPlausibility(config());
+      believe(slack_N);
+      EXPECT_EQ(see(taut_N), Fault::kNone) << slack_N << " to " << taut_N;
+    }
+  }
+  // What a zero that has drifted reads when it is slack is still told from its mirror image.
+  plausibility_ = LoadCellPlausibility(config());
+  believe(-0.1);
+  EXPECT_EQ(see(0.1), Fault::kSignFlip);
+}
+
 TEST_F(PlausibilityTest, ALoadThatJumpsIsBelieved) {
   believe(1.0);
   EXPECT_EQ(see(30.0), Fault::kNone);

@@ -19,6 +19,7 @@ namespace {
 constexpr double kStep_N = 20.0;
 /// Unloading begins 0.1 s after the halt; on a slow bus the halt itself is a scan later.
 constexpr double kWatched_s = 0.095, kWatchedRtu_s = 0.18;
+constexpr double kTwoScansRtu_s = 0.16;
 /// Of the rig's file: what a sample of the stiffest kind would have made of the way.
 constexpr double kStiffest_N_per_m = 1000.0;
 
@@ -53,6 +54,8 @@ void trial(TrialRig& rig, int number, double wait_s, int cell, bool tcp) {
   const std::int64_t loading_ns = rig.truth().lastLoading_ns(begun_ns);
   const double drawn_m = rig.truth().drawn_m(begun_ns, monotonic_ns());
   rig.rig().addForce(cell, 0.0);
+  // Until that is read: the next trial is not to begin with a cell that is not trusted.
+  if (!tcp) std::this_thread::sleep_for(std::chrono::duration<double>(kTwoScansRtu_s));
   const bool moved = rig.truth().drawn_m(begun_ns - 200'000'000, begun_ns) > 1e-4;
   const bool closed = rig.waitForSession(10.0);
   const auto report = verifySession(session);

@@ -29,6 +29,8 @@ struct LoadCellScannerOptions {
   std::chrono::microseconds tcp_period{5000};
   /// Called from the reading threads; must be quick and safe to call from several.
   std::function<void(const LoadCellEvent&)> on_event;
+  /// Called likewise with each reading, once reading() gives it.
+  std::function<void(const LoadCellReading&)> on_reading;
 };
 
 /// How the scans of the bus that a cell hangs on went so far.
