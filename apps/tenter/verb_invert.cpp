@@ -8,10 +8,10 @@
 #include <optional>
 
 #include "interrupt.h"
+#include "invert_target.h"
 #include "material_options.h"
 #include "output_guard.h"
 #include "progress.h"
-#include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
 #include "tenter/inversion/material_directions.h"
 #include "tenter/inversion/problem_file.h"
@@ -27,7 +27,8 @@ constexpr double kLeastBudget_s = 1e-3;
 constexpr double kSolving = 0.95;
 
 struct Options {
-  std::string target, output, warp, method = "direct", gravity = "0,0,-9.80665";
+  std::string target, output, warp, method = "direct", gravity;
+  MeasuredTargetOptions measured;
   MaterialOptions material;
   std::vector<std::string> obstacles, fix;
   double friction = 0.4, contact_distance_mm = 0.0, time_budget_s = 0.0;
@@ -36,8 +37,17 @@ struct Options {
 
 void declare(CLI::App& command, Options& o) {
   command
-      .add_option("target", o.target, "Shape in which the shell is to hang: OBJ, PLY or VTP [m]")
+      .add_option("target", o.target,
+                  "Shape in which the shell is to hang: OBJ, PLY or VTP [m], or a measurement's "
+                  "folder, whose clips then hold it")
       ->required();
+  command.add_option("--frame", o.measured.frame, "Of a measurement, from 0; else its last")
+      ->check(CLI::NonNegativeNumber);
+  command
+      .add_option("--nodes", o.measured.nodes,
+                  "Of a measurement: vertices a side of the mesh that is laid through its vertices")
+      ->check(CLI::Range(5, 400))
+      ->capture_default_str();
   declareMaterial(command, o.material);
   command
       .add_option(
@@ -59,7 +69,8 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("--warp", o.warp,
                      "x,y,z: direction of the warp, laid into each triangle, instead of the "
                      "target's material coordinates");
-  command.add_option("--gravity", o.gravity, "x,y,z [m/s^2]")->capture_default_str();
+  command.add_option("--gravity", o.gravity,
+                     "x,y,z [m/s^2]; else a measurement's own, or 0,0,-9.80665");
   command.add_option("--time-budget", o.time_budget_s, "Most seconds; 0: no limit")
       ->check(CLI::NonNegativeNumber);
   command
@@ -72,13 +83,20 @@ void declare(CLI::App& command, Options& o) {
   command.add_option("-o,--output", o.output, "Folder to write")->required();
 }
 
-Result<ShellMaterial> shellMaterialOf(const Options& o) {
+Result<Vec3> gravityOf(const Options& o, const Vec3& otherwise) {
+  if (o.gravity.empty()) return otherwise;
   const auto gravity = parseNumbers(o.gravity, 3, "--gravity");
+  if (!gravity) return gravity.error();
+  return Vec3((*gravity)[0], (*gravity)[1], (*gravity)[2]);
+}
+
+Result<ShellMaterial> shellMaterialOf(const Options& o, const Vec3& gravity_m_per_s2) {
+  const auto gravity = gravityOf(o, gravity_m_per_s2);
   if (!gravity) return gravity.error();
   const auto material = simulatedMaterialOf(o.material);
   if (!material) return material.error();
   return ShellMaterial{material->model, material->laws, material->material.areal_density_kg_per_m2,
-                       Vec3((*gravity)[0], (*gravity)[1], (*gravity)[2])};
+                       *gravity};
 }
 
 /// Material directions where the target has none, or others are asked for.
@@ -101,19 +119,20 @@ Result<std::vector<MaterialFrame>> framesOf(const Options& o, const InversionPro
 
 Result<InversionProblem> problemOf(const Options& o, const Console& console) {
   InversionProblem problem;
-  auto material = shellMaterialOf(o);
+  auto target = readTarget(o.target, o.measured, console);
+  if (!target) return target.error();
+  problem.target = std::move(target->mesh);
+  auto material = shellMaterialOf(o, target->gravity_m_per_s2);
   if (!material) return material.error();
   problem.material = std::move(material).value();
-  auto file = readMesh(o.target);
-  if (!file) return file.error();
-  problem.target = std::move(file->mesh);
   if (auto valid = validateMesh(problem.target); !valid) return valid.error().in(o.target);
   auto frames = framesOf(o, problem, console);
   if (!frames) return frames.error().in(o.target);
   problem.frames = std::move(frames).value();
   auto fixed = selectVertices(o.fix, problem.target);
   if (!fixed) return fixed.error();
-  problem.fixed = std::move(fixed).value();
+  std::set_union(fixed->begin(), fixed->end(), target->held.begin(), target->held.end(),
+                 std::back_inserter(problem.fixed));
   std::vector<std::unique_ptr<Obstacle>> obstacles;
   for (const std::string& description : o.obstacles) {
     auto obstacle = makeObstacle(description);
@@ -137,6 +156,8 @@ Result<nlohmann::json> askedOf(const Options& o, const InversionProblem& problem
 nlohmann::json provenanceOf(const Options& o) {
   return {{"program", std::string("tenter ") + TENTER_VERSION},
           {"target", o.target},
+          {"frame", o.measured.frame ? nlohmann::json(*o.measured.frame) : nlohmann::json()},
+          {"nodes", o.measured.nodes},
           {"material", o.material.file.empty() ? nlohmann::json{{"rho", o.material.rho},
                                                                 {"k_stretch", o.material.k_stretch},
                                                                 {"k_bend", o.material.k_bend}}
@@ -153,10 +174,11 @@ void tell(const Options& o, const InversionProblem& problem, const InversionResu
           const FeasibleRange* range, Console& console) {
   const auto certificate = certificateToJson(problem, r, nullptr, range);
   console.answer = {{"contacts", problem.contacts.size()}, {"folder", o.output}};
-  for (const char* key : {"status", "reason", "force_residual_rel", "cone_violations",
-                          "cone_margin_min", "lambda_min_per_s2", "negative_eigenvalues",
-                          "redrape_max_rel", "seconds", "solve_cpu_seconds", "factorizations",
-                          "stretch_max", "bend_max_rad", "load_balanced", "proof", "range"}) {
+  for (const char* key :
+       {"status", "reason", "force_residual_rel", "force_rounding_rel", "cone_violations",
+        "cone_margin_min", "lambda_min_per_s2", "negative_eigenvalues", "redrape_max_rel",
+        "seconds", "solve_cpu_seconds", "factorizations", "stretch_max", "bend_max_rad",
+        "load_balanced", "proof", "range"}) {
     if (certificate.contains(key)) console.answer[key] = certificate.at(key);
   }
   const Certificate& c = r.certificate;

@@ -13,8 +13,6 @@ namespace {
 constexpr double kDefaultSigma_m = 7.5e-5;
 /// Added to the diagonal, of its mean: nodes that vertices hardly see still factorise.
 constexpr double kRidge = 1e-11;
-/// Laplacian in the starting shape, of the mean weight of a node.
-constexpr double kSmoothing = 0.05;
 
 using Sparse = Eigen::SparseMatrix<double>;
 
@@ -168,7 +166,8 @@ void PositionResiduals::setCommonErrors(const Eigen::MatrixXd& modes) {
 }
 
 void fillMeasuredShape(const Interpolation& p, const TrackedFrame& frame, const GridLines& lines,
-                       const Points3& rest, const std::vector<bool>& held, Points3& nodes) {
+                       const Points3& rest, const std::vector<bool>& held, Points3& nodes,
+                       double smoothing) {
   const bool tracked = frame.positions.cols() == p.rows();
   Eigen::VectorXd seen = Eigen::VectorXd::Zero(p.rows());
   Eigen::MatrixX3d places = Eigen::MatrixX3d::Zero(p.rows(), 3);
@@ -180,7 +179,7 @@ void fillMeasuredShape(const Interpolation& p, const TrackedFrame& frame, const 
   const Sparse weighted = seen.asDiagonal() * Sparse(p);
   const Sparse normal = weighted.transpose() * weighted;
   const double mean = meanDiagonal(normal);
-  const Sparse laplacian = gridLaplacian(lines, mean > 0.0 ? kSmoothing * mean : 1.0);
+  const Sparse laplacian = gridLaplacian(lines, mean > 0.0 ? smoothing * mean : 1.0);
   const Sparse all = normal + laplacian;
   std::vector<int> free;
   Eigen::MatrixX3d known = Eigen::MatrixX3d::Zero(nodes.cols(), 3);

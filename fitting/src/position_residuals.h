@@ -65,12 +65,16 @@ class PositionResiduals {
   Eigen::VectorXd mode_removed_;  ///< 1 - 1 / sqrt(1 + s^2).
 };
 
+/// What the displacement's Laplacian weighs beside the vertices: a start for a solver is better
+/// smooth, a shape for its own sake is not to be moved.
+inline constexpr double kSmoothStart = 0.05, kFillOnly = 1e-6;
+
 /// A smooth configuration near the measured one: least squares at the vertices with a little of the
 /// displacement's Laplacian, which fills what no vertex shows. Held nodes keep their place in
 /// `nodes`; the others are overwritten.
 void fillMeasuredShape(const Interpolation& interpolation, const TrackedFrame& frame,
                        const GridLines& lines, const Points3& rest, const std::vector<bool>& held,
-                       Points3& nodes);
+                       Points3& nodes, double smoothing = kSmoothStart);
 
 /// Squared errors of the vertices that are seen, and what noise alone makes of them.
 struct PositionMisfit {

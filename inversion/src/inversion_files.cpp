@@ -143,6 +143,7 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
       {"fixed", fixed},
       {"contacts", contactsJson(problem, result)},
       {"force_residual_rel", c.force_residual_rel},
+      {"force_rounding_rel", c.force_rounding_rel},
       {"cone_violations", c.cone_violations},
       {"cone_margin_min", c.cone_margin_min},
       {"cone_margin_histogram", histogram(c.cone_margins)},

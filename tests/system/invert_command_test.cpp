@@ -90,6 +90,36 @@ TEST(InvertCommand, AFittedFabricOnASphereIsCertified) {
                                      "rest.obj", "strains.vtp"));
 }
 
+TEST(InvertCommand, AMeasuredClothHangsFromWhatHeldIt) {
+  TemporaryFolder folder;
+  folder.write("fitted.json", satin());
+  const Outcome captured =
+      tenter({"twin", "capture", "--fabric", "satin-4", "--protocol", "bend-weft", "--seed", "3",
+              "--measurement", "--frames", "3", "--nodes", "25", "-o", "M"},
+             folder.path());
+  ASSERT_EQ(captured.exit_code, 0) << captured.err;
+  const Outcome outcome = tenter({"invert", "M", "--frame", "2", "--nodes", "15", "--material",
+                                  "fitted.json", "-o", "DIR", "--json"},
+                                 folder.path());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  const auto answer = outcome.json();
+  EXPECT_EQ(answer.at("status"), "certified");
+  EXPECT_EQ(answer.at("contacts"), 0);
+  // As stiff and light as this cloth is, the last bit of its coordinates is 1e-10 of its weight.
+  const double rounding = answer.at("force_rounding_rel");
+  EXPECT_GT(rounding, 2e-11);
+  EXPECT_LT(rounding, 5e-10);
+  EXPECT_LE(answer.at("force_residual_rel").get<double>(), 2.0 * rounding);
+  const Outcome missing = tenter(
+      {"invert", "M", "--frame", "3", "--material", "fitted.json", "-o", "E"}, folder.path());
+  EXPECT_EQ(missing.exit_code, 3);
+  EXPECT_THAT(missing.err, HasSubstr("frame 3"));
+  const Outcome no_frames =
+      tenter({"invert", "fitted.json", "--frame", "1", "--material", "fitted.json", "-o", "E"},
+             folder.path());
+  EXPECT_EQ(no_frames.exit_code, 2);
+}
+
 TEST(InvertCommand, WithoutMaterialCoordinatesTheWarpIsSaid) {
   TemporaryFolder folder;
   folder.write("fitted.json", satin());
