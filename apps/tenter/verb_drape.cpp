@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -21,11 +23,14 @@ namespace {
 constexpr std::string_view kOutputMarker = "\"displacement_m\"";
 /// A mesh drawn in millimetres exceeds this, a garment or a curtain does not.
 constexpr double kLargeSheet_m = 20.0;
+/// Unless the user says otherwise, the smaller of a force and a share of the lightest node's
+/// weight.
+constexpr double kTolerance_N = 1e-9, kToleranceOfNodeWeight = 1e-4;
 
 struct Options {
   std::string mesh, output, gravity = "0,0,-9.80665";
   MaterialOptions material;
-  std::vector<std::string> fix;
+  std::vector<std::string> fix, move;
   double tolerance_N = 0.0, time_budget_s = 0.0;
   int max_iterations = 500;
 };
@@ -37,9 +42,16 @@ void declare(CLI::App& command, Options& o) {
       .add_option("--fix", o.fix,
                   "Vertices that stay: 0,99 (from 0), 4-17, box:x0,y0,z0,x1,y1,z1 [m]")
       ->allow_extra_args(false);
+  command
+      .add_option("--move", o.move,
+                  "A vertex of --fix and how far it is moved from rest: 0:0.05,0,0 [m]; again for "
+                  "more")
+      ->allow_extra_args(false);
   command.add_option("--gravity", o.gravity, "x,y,z [m/s^2]")->capture_default_str();
-  command.add_option("--tolerance-N", o.tolerance_N,
-                     "Largest force left on a degree of freedom; 0: 1e-4 of the lightest node");
+  command.add_option(
+      "--tolerance-N", o.tolerance_N,
+      "Largest force left on a degree of freedom; 0: 1e-4 of the lightest node's weight, "
+      "at most 1e-9");
   command.add_option("--max-iterations", o.max_iterations, "Most Newton steps")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
@@ -75,6 +87,25 @@ Result<ClothSystem> systemOf(const Options& o) {
   return system;
 }
 
+Result<void> moveFixed(const std::vector<std::string>& moves, const ClothSystem& system,
+                       ClothState& state) {
+  const std::vector<int>& fixed = system.setup().fixed_nodes;
+  for (const std::string& move : moves) {
+    const std::size_t colon = move.find(':');
+    int id = -1;
+    const char* const id_end = move.data() + std::min(colon, move.size());
+    const auto [end, code] = std::from_chars(move.data(), id_end, id);
+    if (colon == std::string::npos || code != std::errc() || end != id_end)
+      return usageError("--move: cannot read '" + move + "'", "use a vertex and x,y,z: 0:0.05,0,0");
+    if (std::find(fixed.begin(), fixed.end(), id) == fixed.end())
+      return usageError("--move: vertex " + std::to_string(id) + " is not one of --fix");
+    const auto by = parseNumbers(move.substr(colon + 1), 3, "--move");
+    if (!by) return by.error();
+    state.q.segment<3>(3 * id) += Vec3((*by)[0], (*by)[1], (*by)[2]);
+  }
+  return {};
+}
+
 Result<void> writeDraped(const std::string& file, const ClothSystem& system,
                          const ClothState& state) {
   const SheetMesh& sheet = system.sheet();
@@ -89,11 +120,15 @@ Result<void> writeDraped(const std::string& file, const ClothSystem& system,
   return writeVtp(file, draped, data);
 }
 
-EquilibriumOptions solverOptions(const Options& o, Progress& progress) {
+EquilibriumOptions solverOptions(const Options& o, const ClothSystem& system, Progress& progress) {
   EquilibriumOptions options;
   options.max_iterations = o.max_iterations;
-  options.force_tolerance_N = o.tolerance_N;
+  options.force_tolerance_N =
+      o.tolerance_N > 0.0
+          ? o.tolerance_N
+          : std::min(kTolerance_N, kToleranceOfNodeWeight * system.lightestFreeNodeWeight_N());
   options.compute_lambda_min = true;
+  options.hold_swivel = true;
   options.time_budget_s = o.time_budget_s;
   options.cancelled = interrupted;
   options.progress = [&progress](int iteration, double residual_N) {
@@ -105,9 +140,11 @@ EquilibriumOptions solverOptions(const Options& o, Progress& progress) {
   return options;
 }
 
-void tell(const Options& o, const EquilibriumSummary& s, bool converged, Console& console) {
+void tell(const Options& o, const EquilibriumSummary& s, bool converged, bool swivels,
+          Console& console) {
   console.answer = {{"converged", converged},
                     {"stable", s.stable},
+                    {"swivels", swivels},
                     {"termination", describe(s.termination)},
                     {"iterations", s.newton_steps},
                     {"factorizations", s.factorizations},
@@ -122,6 +159,8 @@ void tell(const Options& o, const EquilibriumSummary& s, bool converged, Console
                 "%s: residual %.3g N after %d Newton steps, smallest eigenvalue %.4g 1/s^2, %.2g s",
                 o.output.c_str(), s.residual_N, s.newton_steps, s.lambda_min_per_s2, s.seconds);
   console.say(text);
+  if (swivels)
+    console.say("nothing stops it from turning about its pin; it is stable but for that");
 }
 
 void warnIfLarge(const Options& o, const ClothSystem& system, const Console& console) {
@@ -143,15 +182,17 @@ Result<int> run(const Options& o, Console& console) {
   if (!system) return system.error();
   warnIfLarge(o, *system, console);
   ClothState state = system->restState();
+  if (auto moved = moveFixed(o.move, *system, state); !moved) return moved.error();
+  const bool swivels = system->swivelDof(state) >= 0;
   EquilibriumSolver solver(*system);
   EquilibriumSummary summary;
   {
     Progress progress(console);
-    summary = solver.solve(state, solverOptions(o, progress));
+    summary = solver.solve(state, solverOptions(o, *system, progress));
   }
   if (auto done = writeDraped(o.output, *system, state); !done) return done.error();
   const bool converged = summary.converged() && summary.stable;
-  tell(o, summary, converged, console);
+  tell(o, summary, converged, swivels, console);
   if (converged) return kDone;
   console.warn("not an equilibrium (" + describe(summary.termination) +
                "); the best so far is in " + o.output);

@@ -4,10 +4,10 @@
 #include <functional>
 #include <vector>
 
-#include "rest_path.h"
 #include "sparse_lu.h"
 #include "tenter/inversion/contacts.h"
 #include "tenter/inversion/inverse_shell.h"
+#include "tenter/mechanics/turning_path.h"
 
 namespace tenter {
 
@@ -91,7 +91,7 @@ class RestNewton {
   Vec3 gravity_;
   Eigen::VectorXd target_area_;
   double weight_N_ = 0.0;
-  RestPath path_;
+  TurningPath path_;
   double rounding_ = 0.0;                ///< Force that is zero but for rounding, of the weight.
   std::vector<int> row_of_, column_of_;  ///< Of each coordinate of the shell; -1: left out.
   std::vector<int> coordinate_of_;       ///< Of each column; -1: of the border.

@@ -9,6 +9,9 @@
 namespace tenter {
 namespace {
 
+/// Supports this near gravity's line, in the sheet's size, do not stop it from turning.
+constexpr double kOnAxis = 1e-9;
+
 bool heldByOneSupport(const DofMap& map, const Triangle& t) {
   const auto moves = [&](int node) { return map.node_dof[node] >= 0; };
   if (moves(t[0]) || moves(t[1]) || moves(t[2])) return false;
@@ -277,6 +280,29 @@ void ClothSystem::advance(ClothState& state, const Eigen::VectorXd& step, double
     pose.linear() = Eigen::Quaterniond(pose.linear()).normalized().toRotationMatrix();
     setClipPose(state, static_cast<int>(c), pose);
   }
+}
+
+int ClothSystem::swivelDof(const ClothState& state) const {
+  const SystemSetup& setup = impl_->setup;
+  const double weight = setup.gravity_m_per_s2.norm();
+  if (setup.planar || setup.fixed_nodes.empty() || !setup.clips.empty() || !(weight > 0.0))
+    return -1;
+  const Vec3 axis = setup.gravity_m_per_s2 / weight;
+  const Vec3 pin = state.q.segment<3>(3 * setup.fixed_nodes.front());
+  int most = -1;
+  double furthest = 0.0;
+  for (int i = 0; i < impl_->map.node_count; ++i) {
+    const Vec3 motion = axis.cross(Vec3(state.q.segment<3>(3 * i) - pin));
+    int along = 0;
+    const double moved = motion.cwiseAbs().maxCoeff(&along);
+    if (!(moved > furthest)) continue;
+    furthest = moved;
+    if (impl_->map.node_dof[i] >= 0) most = impl_->map.node_dof[i] + along;
+  }
+  for (const int n : setup.fixed_nodes) {
+    if (axis.cross(Vec3(state.q.segment<3>(3 * n) - pin)).norm() > kOnAxis * furthest) return -1;
+  }
+  return most;
 }
 
 Eigen::VectorXd ClothSystem::dofMass() const {

@@ -9,6 +9,7 @@
 
 #include "smallest_eigenvalue.h"
 #include "tenter/mechanics/sparse_cholesky.h"
+#include "tenter/mechanics/turning_path.h"
 
 namespace tenter {
 namespace {
@@ -22,6 +23,8 @@ constexpr double kRoundings = 8.0;
 /// after one that did not, and below which the exact Hessian is tried again.
 constexpr double kFirstShare = 0.4, kShareGrowth = 10.0, kEase = 0.2, kStiffen = 2.0;
 constexpr double kLeastShare = 0.02;
+/// The projection is the Hessian itself, to this share of its stiffest entry.
+constexpr double kSameMatrix = 1e-12;
 /// Smallest shift of a singular or indefinite matrix, as a share of its stiffest entry.
 constexpr double kLeastShift = 1e-9, kShiftGrowth = 4.0;
 /// The energy's change over the one foreseen: below the first a step was in vain, below the second
@@ -36,7 +39,6 @@ constexpr int kInverseIterations = 6;
 constexpr double kGoldenAngle = 2.399963;  ///< Starts inverse iteration without a symmetry.
 /// Moves off a saddle, as shares of the sheet's size.
 constexpr double kFirstEscape = 1e-5, kLastEscape = 0.2;
-constexpr int kWatchdog = 4;
 /// A full step that cuts the residual to this share shows that its factors serve for further steps,
 /// and each of those that cuts it to the second that they go on serving.
 constexpr double kFactorsNear = 0.05, kFactorsServe = 0.3;
@@ -49,6 +51,13 @@ double stiffestEntry(const SparseLower& h) {
   return stiffest;
 }
 
+std::vector<int> heldNodes(const SystemSetup& setup) {
+  std::vector<int> held = setup.fixed_nodes;
+  for (const ClipSetup& clip : setup.clips)
+    held.insert(held.end(), clip.nodes.begin(), clip.nodes.end());
+  return held;
+}
+
 double sizeOf(const ClothState& state) { return std::max(state.q.cwiseAbs().maxCoeff(), 1e-3); }
 
 }  // namespace
@@ -58,7 +67,8 @@ struct EquilibriumSolver::Impl {
       : system(s),
         mixed(s.hessian(s.restState(), Projection::kNone)),
         cholesky(mixed),
-        mass(s.dofMass()) {
+        mass(s.dofMass()),
+        path(s.sheet().rest, heldNodes(s.setup())) {
     g.resize(s.dofCount());
     trial_g.resize(s.dofCount());
     step.resize(s.dofCount());
@@ -69,20 +79,17 @@ struct EquilibriumSolver::Impl {
   std::vector<double> exact;
   SparseCholesky cholesky;
   Eigen::VectorXd mass;
+  TurningPath path;
+  SparseLower held;  ///< Hessian of a sheet that swivels, with one degree of freedom held.
+  bool hold_swivel = false;
   double share = 0.0;         ///< Of the projection, to begin with.
   double used_share = 0.0;    ///< Of the projection in the factors at hand.
   bool factors_near = false;  ///< Those are of an exact Hessian close by.
   Eigen::VectorXd g, trial_g, step;
   ClothState trial, other;
-  /// Last state from which the energy has to fall, and the Newton step there (watchdog).
-  struct Reference {
-    ClothState state;
-    double energy = 0.0;
-    Eigen::VectorXd g, step;
-    int steps_since = 0;
-  } reference;
 
-  double roundingOfForces(const ClothState& state) const;
+  const SparseLower& hessian(const ClothState& state, Projection projection);
+  double roundingOfForces(const ClothState& state);
   double residual(const Eigen::VectorXd& gradient) const { return gradient.cwiseAbs().maxCoeff(); }
   bool newtonDirection(const ClothState& state, EquilibriumSummary& summary, bool from_exact);
   bool factorizeMixed(const ClothState& state, EquilibriumSummary& summary);
@@ -91,7 +98,6 @@ struct EquilibriumSolver::Impl {
   double energyAt(const ClothState& state, double alpha, ClothState& place) const;
   void rescale(const ClothState& state, double factor, double& alpha, double& e);
   bool lineSearch(ClothState& state, double& energy);
-  bool tryFullStep(ClothState& state, double& energy);
   bool stepWithOldFactors(ClothState& state, double& energy);
   const Eigen::VectorXd& softestDirection();
   bool leaveSaddle(ClothState& state, double& energy, EquilibriumSummary& summary);
@@ -99,6 +105,18 @@ struct EquilibriumSolver::Impl {
   Termination iterate(ClothState& state, const EquilibriumOptions& options,
                       EquilibriumSummary& summary, Clock::time_point start);
 };
+
+/// With the swivel held the matrix is definite exactly where the Hessian is but for the swivel, and
+/// Newton's steps differ by a swivel only, because no gradient has a part along it.
+const SparseLower& EquilibriumSolver::Impl::hessian(const ClothState& state,
+                                                    Projection projection) {
+  const SparseLower& h = system.hessian(state, projection);
+  const int dof = hold_swivel ? system.swivelDof(state) : -1;
+  if (dof < 0) return h;
+  held = h;
+  held.value[held.column_begin[dof]] += stiffestEntry(h);
+  return held;
+}
 
 /// step = -M^-1 g. M is the exact Hessian H if that is positive definite, otherwise H + s (P - H)
 /// with P its element-wise projection and s as small as serves, searched for from where the last
@@ -113,7 +131,7 @@ bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state, Equilibri
   bool served = false;
   if (share < kLeastShare || from_exact) {
     ++summary.factorizations;
-    served = cholesky.factorize(system.hessian(state, Projection::kNone));
+    served = cholesky.factorize(hessian(state, Projection::kNone));
     share = served ? 0.0 : std::max(share, kFirstShare);
   }
   if (!served && !factorizeMixed(state, summary)) {
@@ -126,8 +144,12 @@ bool EquilibriumSolver::Impl::newtonDirection(const ClothState& state, Equilibri
 }
 
 bool EquilibriumSolver::Impl::factorizeMixed(const ClothState& state, EquilibriumSummary& summary) {
-  exact = system.hessian(state, Projection::kNone).value;
-  const SparseLower& projected = system.hessian(state, Projection::kPositiveSemiDefinite);
+  exact = hessian(state, Projection::kNone).value;
+  const SparseLower& projected = hessian(state, Projection::kPositiveSemiDefinite);
+  double apart = 0.0;
+  for (std::size_t i = 0; i < exact.size(); ++i)
+    apart = std::max(apart, std::abs(projected.value[i] - exact[i]));
+  if (apart <= kSameMatrix * stiffestEntry(projected)) share = 1.0;  // nothing is compressed
   for (;; share = std::min(1.0, kShareGrowth * share)) {
     for (std::size_t i = 0; i < exact.size(); ++i)
       mixed.value[i] = exact[i] + share * (projected.value[i] - exact[i]);
@@ -143,7 +165,7 @@ bool EquilibriumSolver::Impl::factorizeMixed(const ClothState& state, Equilibriu
 /// of H.
 bool EquilibriumSolver::Impl::factorizeShifted(const ClothState& state,
                                                EquilibriumSummary& summary) {
-  const SparseLower& h = system.hessian(state, Projection::kNone);
+  const SparseLower& h = hessian(state, Projection::kNone);
   const double stiffest = stiffestEntry(h);
   for (double shift = kLeastShift * stiffest; shift < stiffest; shift *= kShiftGrowth) {
     ++summary.factorizations;
@@ -152,9 +174,9 @@ bool EquilibriumSolver::Impl::factorizeShifted(const ClothState& state,
   return false;
 }
 
-double EquilibriumSolver::Impl::roundingOfForces(const ClothState& state) const {
+double EquilibriumSolver::Impl::roundingOfForces(const ClothState& state) {
   return kRoundings * std::numeric_limits<double>::epsilon() *
-         stiffestEntry(system.hessian(state, Projection::kNone)) * state.q.cwiseAbs().maxCoeff();
+         stiffestEntry(hessian(state, Projection::kNone)) * state.q.cwiseAbs().maxCoeff();
 }
 
 /// A step longer than a third of the sheet is never meant.
@@ -162,11 +184,15 @@ double EquilibriumSolver::Impl::fullStep(const ClothState& state) const {
   return std::min(1.0, sizeOf(state) / 3.0 / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
 }
 
-/// Energy at state + alpha step; `place` is left there.
+/// Energy at the state moved by alpha step, along a path that turns triangles instead of stretching
+/// them; `place` is left there.
 double EquilibriumSolver::Impl::energyAt(const ClothState& state, double alpha,
                                          ClothState& place) const {
   place = state;
   system.advance(place, step, alpha);
+  const int nodes = system.sheet().nodeCount();
+  const Points3 from = state.positions(nodes);
+  Eigen::Map<Points3>(place.q.data(), 3, nodes) = path.moved(from, place.positions(nodes) - from);
   return system.energy(place);
 }
 
@@ -183,32 +209,6 @@ void EquilibriumSolver::Impl::rescale(const ClothState& state, double factor, do
   }
 }
 
-/// Takes a Newton step although the energy may rise: bending an almost inextensible sheet along a
-/// straight step stretches it, and the next step takes that out. Returns false, back at the
-/// reference with its step, when kWatchdog such steps have not paid.
-bool EquilibriumSolver::Impl::tryFullStep(ClothState& state, double& energy) {
-  const double slope = g.dot(step);
-  if (reference.steps_since == 0 || energy <= reference.energy) {
-    reference = {state, energy, g, step, 0};
-  }
-  const double alpha = fullStep(state);
-  const double e = energyAt(state, alpha, trial);
-  const bool falls = e <= energy + kArmijo * alpha * slope;
-  if (std::isfinite(e) && (falls || reference.steps_since < kWatchdog)) {
-    std::swap(state, trial);
-    energy = e;
-    system.gradient(state, g);
-    reference.steps_since = e < reference.energy ? 0 : reference.steps_since + 1;
-    return true;
-  }
-  state = reference.state;
-  energy = reference.energy;
-  g = reference.g;
-  step = reference.step;
-  reference.steps_since = 0;
-  return false;
-}
-
 /// A step with the factors of an earlier, near state; false, and nothing changed, if that does not
 /// serve any more.
 bool EquilibriumSolver::Impl::stepWithOldFactors(ClothState& state, double& energy) {
@@ -221,7 +221,6 @@ bool EquilibriumSolver::Impl::stepWithOldFactors(ClothState& state, double& ener
   std::swap(state, trial);
   std::swap(g, trial_g);
   energy = system.energy(state);
-  reference.steps_since = 0;
   return true;
 }
 
@@ -251,6 +250,7 @@ bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
     std::swap(state, trial);
     std::swap(g, trial_g);
     energy = e;
+    factors_near = used_share == 0.0 && alpha == 1.0 && residual(g) < kFactorsNear * before;
     if (k == 0 && agreed > kAsForeseen) share *= kEase;
     if (k > 0 || agreed < kInVain) share = std::min(1.0, kStiffen * share);
     return true;
@@ -292,7 +292,6 @@ bool EquilibriumSolver::Impl::leaveSaddle(ClothState& state, double& energy,
   std::swap(state, other);
   energy = best;
   system.gradient(state, g);
-  reference.steps_since = 0;
   return true;
 }
 
@@ -303,7 +302,6 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
                                : kForceToleranceOfNodeWeight * system.lightestFreeNodeWeight_N();
   double energy = system.energy(state);
   system.gradient(state, g);
-  reference.steps_since = 0;  // whatever an earlier solve left there is of another state
   share = 0.0;
   factors_near = false;
   int saddles = 0;
@@ -340,10 +338,6 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
         newtonDirection(state, summary, false);
       }
     }
-    if (served && tryFullStep(state, energy)) {
-      factors_near = residual(g) < kFactorsNear * summary.residual_N;
-      continue;
-    }
     if (lineSearch(state, energy)) continue;
     if (!served && share < 1.0) {
       share = 1.0;
@@ -362,7 +356,7 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
 
 void EquilibriumSolver::Impl::measureStability(const ClothState& state,
                                                EquilibriumSummary& summary) {
-  const SparseLower& h = system.hessian(state, Projection::kNone);
+  const SparseLower& h = hessian(state, Projection::kNone);
   const SmallestEigenvalue pair = smallestEigenvalue(h, mass, cholesky);
   summary.lambda_min_per_s2 = pair.value;
   summary.lambda_min_residual_per_s2 = pair.residual;
@@ -380,6 +374,7 @@ EquilibriumSummary EquilibriumSolver::solve(ClothState& state, const Equilibrium
   summary.lambda_min_per_s2 = summary.lambda_min_residual_per_s2 =
       std::numeric_limits<double>::quiet_NaN();
   const ClothState before = state;
+  impl_->hold_swivel = options.hold_swivel;
   summary.termination = impl_->iterate(state, options, summary, start);
   if (summary.converged()) {
     if (!options.leave_saddles) {

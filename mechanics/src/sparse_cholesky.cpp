@@ -5,6 +5,7 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <numeric>
 #include <stdexcept>
@@ -20,29 +21,37 @@ void callIfLoaded(const char* name, int argument) {
     reinterpret_cast<void (*)(int)>(function)(argument);
 }
 
-/// A release of OpenBLAS takes a processor younger than itself for one of 2004 and computes at a
-/// third of its speed. Has it choose again, with Haswell's kernels, where AVX2 is there; what the
-/// user chose in OPENBLAS_CORETYPE stays. No BLAS call may be under way.
-bool chooseKernels() {
+/// Kernels of a kind of processor that this one has all instructions of; null: no better ones
+/// known.
+const char* betterKernels() {
 #ifdef __x86_64__
   __builtin_cpu_init();
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
+    return "SkylakeX";
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return "Haswell";
+#endif
+  return nullptr;
+}
+
+/// A release of OpenBLAS takes a processor younger than itself for one of 2004 and computes at a
+/// third of its speed. Has it choose again, among the kernels that this processor can run; what the
+/// user chose in OPENBLAS_CORETYPE stays. No BLAS call may be under way.
+bool chooseKernels() {
   constexpr const char* kChoice = "OPENBLAS_CORETYPE";
-  const bool able = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  if (!able || std::getenv(kChoice) != nullptr) return false;
+  const char* better = betterKernels();
+  if (better == nullptr || std::getenv(kChoice) != nullptr) return false;
   const auto name =
       reinterpret_cast<const char* (*)()>(dlsym(RTLD_DEFAULT, "openblas_get_corename"));
   const auto quit = reinterpret_cast<void (*)()>(dlsym(RTLD_DEFAULT, "gotoblas_dynamic_quit"));
   const auto init = reinterpret_cast<void (*)()>(dlsym(RTLD_DEFAULT, "gotoblas_dynamic_init"));
   if (name == nullptr || quit == nullptr || init == nullptr) return false;
   if (std::string_view(name()) != "Prescott") return false;
-  setenv(kChoice, "Haswell", 1);
+  setenv(kChoice, better, 1);
   quit();
   init();
   unsetenv(kChoice);
   return true;
-#else
-  return false;
-#endif
 }
 
 /// Before main, while there is but one thread.
@@ -64,6 +73,12 @@ void useOneThreadInside() {
 }
 
 }  // namespace
+
+/// Supernodes of at most so many columns are joined if less than that share of the entries is then
+/// zero: more arithmetic in fewer, larger blocks. A sheet of 100 x 100 vertices is factorised a
+/// sixth faster than with CHOLMOD's own choice, one of 25 x 25 a third.
+constexpr std::array<std::size_t, 3> kJoinedColumns{32, 64, 128};
+constexpr std::array<double, 3> kJoinedZeros{0.9, 0.2, 0.1};
 
 /// The matrix is kept in the elimination order that CHOLMOD chose. It would otherwise transpose and
 /// permute it before each factorisation, a sixth of the time of the sizes here.
@@ -87,6 +102,11 @@ struct SparseCholesky::Impl {
     common.print = 0;
     common.final_ll = 1;  // L D L' would accept negative pivots
     common.quick_return_if_not_posdef = 1;
+    // Nested dissection: at 100 x 100 vertices 0.56 of the arithmetic of minimum degree.
+    common.nmethods = 1;
+    common.method[0].ordering = CHOLMOD_METIS;
+    std::ranges::copy(kJoinedColumns, common.nrelax);
+    std::ranges::copy(kJoinedZeros, common.zrelax);
     matrix.nrow = matrix.ncol = pattern.size;
     matrix.nzmax = row.size();
     matrix.stype = -1;
@@ -100,7 +120,6 @@ struct SparseCholesky::Impl {
     order.assign(chosen, chosen + pattern.size);
     cholmod_free_factor(&factor, &common);
     reorder(pattern);
-    common.nmethods = 1;
     common.method[0].ordering = CHOLMOD_NATURAL;
     common.postorder = 0;
     analyze();

@@ -164,6 +164,56 @@ TEST(Equilibrium, LeavesTheSaddleOfACompressedStrip) {
   EXPECT_LT(buckled.energy_J, 0.5 * saddle.energy_J);
 }
 
+/// A square sheet of the paper's model, 1 m wide, that hangs from some of its nodes.
+ClothSystem hangingSquare(int nodes, std::vector<int> pins) {
+  SheetMesh sheet = gridSheet({1.0, 1.0}, nodes, nodes, DiagonalPattern::kUniform);
+  SystemSetup setup;
+  setup.areal_density_kg_per_m2 = 0.1;
+  setup.fixed_nodes = std::move(pins);
+  return makeSystem("edge-hinge", std::move(sheet), {3.0, 5e-3}, std::move(setup));
+}
+
+TEST(Equilibrium, PinnedCornersMayMoveByManyEdges) {
+  constexpr int kNodes = 30;
+  const ClothSystem system = hangingSquare(kNodes, {0, kNodes - 1});
+  for (const double edges : {1.0, 3.0, 6.0, 10.0}) {
+    ClothState state = system.restState();
+    const double moved = edges / (kNodes - 1);
+    state.q[0] += moved;
+    state.q[3 * (kNodes - 1)] -= moved;
+    EquilibriumSolver solver(system);
+    EquilibriumOptions options;
+    options.force_tolerance_N = 1e-9;
+    options.compute_lambda_min = true;
+    const EquilibriumSummary summary = solver.solve(state, options);
+    ASSERT_TRUE(summary.converged()) << edges << ": " << describe(summary.termination);
+    EXPECT_LE(summary.residual_N, 1e-9) << edges;
+    EXPECT_TRUE(summary.stable) << edges;
+    EXPECT_GT(summary.lambda_min_per_s2, 100.0 * summary.lambda_min_residual_per_s2) << edges;
+  }
+}
+
+TEST(Equilibrium, OnePinLeavesASwivelThatMayBeHeld) {
+  constexpr int kNodes = 15;
+  const ClothSystem system = hangingSquare(kNodes, {0});
+  ClothState state = system.restState();
+  EXPECT_GE(system.swivelDof(state), 0);
+  EXPECT_EQ(hangingSquare(kNodes, {0, kNodes - 1}).swivelDof(state), -1);
+  EquilibriumSolver solver(system);
+  EquilibriumOptions options;
+  options.hold_swivel = true;
+  options.compute_lambda_min = true;
+  const EquilibriumSummary held = solver.solve(state, options);
+  ASSERT_TRUE(held.converged()) << describe(held.termination);
+  EXPECT_TRUE(held.stable);
+  EXPECT_GT(held.lambda_min_per_s2, 1.0);
+  options.hold_swivel = false;
+  options.leave_saddles = false;
+  const EquilibriumSummary free = solver.solve(state, options);
+  ASSERT_TRUE(free.converged());
+  EXPECT_LT(std::abs(free.lambda_min_per_s2), 1e-3);
+}
+
 TEST(Equilibrium, FreeClipHangsInItsCords) {
   SheetMesh sheet = gridSheet({0.1, 0.1}, 11, 11, DiagonalPattern::kUniform);
   SystemSetup setup = clampedEnds(sheet);

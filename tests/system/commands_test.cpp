@@ -135,6 +135,28 @@ TEST(DrapeCommand, HangsASheetAndCertifiesIt) {
   EXPECT_THAT(test_support::slurp(folder / "out.vtp").substr(0, 4000), HasSubstr("displacement_m"));
 }
 
+TEST(DrapeCommand, MovesPinsAndHangsFromOne) {
+  TemporaryFolder folder;
+  folder.write("sheet.obj", sheetObj(10, 10, 0.02));
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"drape",       "sheet.obj", "--rho",    "0.1",
+                                          "--k-stretch", "3",         "--k-bend", "5e-3",
+                                          "-o",          "o",         "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return tenter(arguments, folder.path());
+  };
+  const Outcome moved = with({"--fix", "0,9", "--move", "0:0.06,0,0", "--move", "9:-0.06,0,0"});
+  ASSERT_EQ(moved.exit_code, 0) << moved.err;
+  EXPECT_LE(moved.json().at("residual_N").get<double>(), 1e-9);
+  EXPECT_FALSE(moved.json().at("swivels").get<bool>());
+  const Outcome one_pin = with({"--fix", "0"});
+  ASSERT_EQ(one_pin.exit_code, 0) << one_pin.err;
+  EXPECT_TRUE(one_pin.json().at("swivels").get<bool>());
+  EXPECT_GT(one_pin.json().at("lambda_min_per_s2").get<double>(), 0.0);
+  for (const char* move : {"1:0,0,0", "0", "0:1,2", ":0,0,0", "x:0,0,0", "0:0,0,nan", ""})
+    EXPECT_EQ(with({"--fix", "0", "--move", move}).exit_code, 2) << move;
+}
+
 TEST(DrapeCommand, StopsAtItsLimitsWithFiveAndTheBestSoFar) {
   TemporaryFolder folder;
   folder.write("sheet.obj", sheetObj(10, 10, 0.02));

@@ -111,6 +111,10 @@ class ClothSystem {
   /// state += scale * step; clips rotate by the exponential map.
   void advance(ClothState& state, const Eigen::VectorXd& step, double scale) const;
 
+  /// Where nothing stops the sheet from turning about gravity's line through its supports (one
+  /// pin): the degree of freedom that this moves most. -1 otherwise.
+  int swivelDof(const ClothState& state) const;
+
   /// What the cloth, its weight on the held nodes and the clip's own weight exert on a clip (cords
   /// and point forces left out): the cords' reaction is minus this.
   Wrench clipWrench(const ClothState& state, int clip) const;

@@ -19,6 +19,9 @@ struct EquilibriumOptions {
   /// Prove stability with the Hessian at the end itself. Otherwise factors of one so near that
   /// steps with them converge fast may stand in: half the factorisations, no proof.
   bool prove_stability = true;
+  /// Judge a sheet that nothing stops from turning about gravity's line through its supports with
+  /// one degree of freedom held: stable but for that. Otherwise rounding decides.
+  bool hold_swivel = false;
   /// Compute the smallest eigenvalue of H v = lambda M v [1/s^2].
   bool compute_lambda_min = false;
   double time_budget_s = 0.0;       ///< 0: none.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "rest_path.h"
+#include "tenter/mechanics/turning_path.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -9,9 +9,16 @@
 namespace tenter {
 namespace {
 
-/// The triangle's edges after the rotation and strain that the displacement of its edges means.
+/// Of a triangle's corner: below this its normal is rounding.
+constexpr double kLeastSine = 1e-12;
+
+/// The triangle's edges after the rotation and strain that the displacement of its edges means; one
+/// without an area is only displaced.
 Eigen::Matrix<double, 3, 2> turnedEdges(const Eigen::Matrix<double, 3, 2>& edges,
                                         const Eigen::Matrix<double, 3, 2>& change) {
+  const double doubled_area = edges.col(0).cross(edges.col(1)).norm();
+  if (!(doubled_area > kLeastSine * edges.col(0).norm() * edges.col(1).norm()))
+    return edges + change;
   Mat3 frame;
   frame.col(0) = edges.col(0).normalized();
   frame.col(2) = edges.col(0).cross(edges.col(1)).normalized();
@@ -33,9 +40,9 @@ Eigen::Matrix<double, 3, 2> turnedEdges(const Eigen::Matrix<double, 3, 2>& edges
 
 }  // namespace
 
-RestPath::RestPath(const TriangleMesh& target, const std::vector<int>& fixed)
-    : triangles_(target.triangles),
-      column_of_(static_cast<std::size_t>(target.vertexCount()), 0),
+TurningPath::TurningPath(const TriangleMesh& mesh, const std::vector<int>& fixed)
+    : triangles_(mesh.triangles),
+      column_of_(static_cast<std::size_t>(mesh.vertexCount()), 0),
       laplacian_(std::make_shared<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>>()) {
   for (const int v : fixed) column_of_[static_cast<std::size_t>(v)] = -1;
   if (fixed.empty()) column_of_[0] = -1;
@@ -43,8 +50,8 @@ RestPath::RestPath(const TriangleMesh& target, const std::vector<int>& fixed)
     if (column >= 0) column = free_count_++;
   std::vector<Eigen::Triplet<double>> entries;
   for (const Triangle& t : triangles_) {
-    const Vec3 a = target.positions.col(t[1]) - target.positions.col(t[0]);
-    const Vec3 b = target.positions.col(t[2]) - target.positions.col(t[0]);
+    const Vec3 a = mesh.positions.col(t[1]) - mesh.positions.col(t[0]);
+    const Vec3 b = mesh.positions.col(t[2]) - mesh.positions.col(t[0]);
     const double length = a.norm(), along = b.dot(a) / length;
     Mat2 edges;
     edges << length, along, 0.0, a.cross(b).norm() / length;
@@ -67,10 +74,11 @@ RestPath::RestPath(const TriangleMesh& target, const std::vector<int>& fixed)
   Eigen::SparseMatrix<double> matrix(free_count_, free_count_);
   matrix.setFromTriplets(entries.begin(), entries.end());
   laplacian_->compute(matrix);
+  if (laplacian_->info() != Eigen::Success) free_count_ = 0;  // a piece that nothing holds
 }
 
-Points3 RestPath::moved(const Points3& rest, const Points3& displacement) const {
-  Points3 out = rest + displacement;
+Points3 TurningPath::moved(const Points3& from, const Points3& displacement) const {
+  Points3 out = from + displacement;
   if (free_count_ == 0) return out;
   Eigen::MatrixXd rhs = Eigen::MatrixXd::Zero(free_count_, 3);
   for (std::size_t k = 0; k < triangles_.size(); ++k) {
@@ -78,7 +86,7 @@ Points3 RestPath::moved(const Points3& rest, const Points3& displacement) const 
     const Corner& c = corners_[k];
     Eigen::Matrix<double, 3, 2> edges, change;
     for (int e = 0; e < 2; ++e) {
-      edges.col(e) = rest.col(t[e + 1]) - rest.col(t[0]);
+      edges.col(e) = from.col(t[e + 1]) - from.col(t[0]);
       change.col(e) = displacement.col(t[e + 1]) - displacement.col(t[0]);
     }
     // What the joined triangles' gradient misses where displaced vertices only are given.

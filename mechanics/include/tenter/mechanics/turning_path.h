@@ -13,19 +13,19 @@ namespace tenter {
 /// triangle's displacement gradient is split into a strain and a rotation, the rotation is carried
 /// out as one, and the triangles are joined again by least squares (a Poisson problem). To first
 /// order this is adding the displacement; the stretch that adding it makes of a rotation, of second
-/// order, is left out.
-class RestPath {
+/// order, is left out. The joining weighs triangles as they lie in `mesh`.
+class TurningPath {
  public:
   /// @param fixed  vertices that move by the displacement exactly.
-  RestPath(const TriangleMesh& target, const std::vector<int>& fixed);
+  TurningPath(const TriangleMesh& mesh, const std::vector<int>& fixed);
 
-  /// rest moved by `displacement` (both 3 x vertices).
-  Points3 moved(const Points3& rest, const Points3& displacement) const;
+  /// `from` moved by `displacement` (both 3 x vertices).
+  Points3 moved(const Points3& from, const Points3& displacement) const;
 
  private:
   struct Corner {
     double area;
-    Eigen::Matrix<double, 2, 3> slopes;  ///< Of the shape functions in the target's triangle.
+    Eigen::Matrix<double, 2, 3> slopes;  ///< Of the shape functions in the mesh's triangle.
     Mat2 inverse_edges;
   };
   std::vector<Triangle> triangles_;
