@@ -69,6 +69,7 @@ struct EquilibriumSolver::Impl {
   std::vector<double> exact;
   SparseCholesky cholesky;
   Eigen::VectorXd mass;
+  double last_shift = 0.0;    ///< That served, as a share of the stiffest entry.
   double share = 0.0;         ///< Of the projection, to begin with.
   double used_share = 0.0;    ///< Of the projection in the factors at hand.
   bool factors_near = false;  ///< Those are of an exact Hessian close by.
@@ -139,15 +140,16 @@ bool EquilibriumSolver::Impl::factorizeMixed(const ClothState& state, Equilibriu
   }
 }
 
-/// Factorises H + shift I with the smallest shift that serves: the softest direction is then that
-/// of H.
+/// Factorises H + shift I with the smallest shift that serves, searched for from a little below the
+/// last one: the softest direction is then that of H.
 bool EquilibriumSolver::Impl::factorizeShifted(const ClothState& state,
                                                EquilibriumSummary& summary) {
   const SparseLower& h = system.hessian(state, Projection::kNone);
   const double stiffest = stiffestEntry(h);
-  for (double shift = kLeastShift * stiffest; shift < stiffest; shift *= kShiftGrowth) {
+  const double first = std::max(kLeastShift, last_shift / (kShiftGrowth * kShiftGrowth));
+  for (last_shift = first; last_shift < 1.0; last_shift *= kShiftGrowth) {
     ++summary.factorizations;
-    if (cholesky.factorize(h, shift)) return true;
+    if (cholesky.factorize(h, last_shift * stiffest)) return true;
   }
   return false;
 }
@@ -304,7 +306,7 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
   double energy = system.energy(state);
   system.gradient(state, g);
   reference.steps_since = 0;  // whatever an earlier solve left there is of another state
-  share = 0.0;
+  share = last_shift = 0.0;
   factors_near = false;
   int saddles = 0;
   for (int k = 0;; ++k) {
