@@ -179,13 +179,25 @@ bool covers(const Arguments& arguments, const std::string& model) {
       ++failed;
       continue;
     }
-    for (const Knot& knot : observedKnots(truth, result->material)) {
-      const bool covered = std::abs(knot.fitted - knot.truth) <= kBand * knot.std;
+    const std::vector<Knot> knots = observedKnots(truth, result->material);
+    std::printf("  seed %d, %.0f s:", seed, result->seconds);
+    for (const Knot& knot : knots) {
+      const double error = (knot.fitted - knot.truth) / knot.std;
+      const bool covered = std::abs(error) <= kBand;
+      if (arguments.verbose || !covered)
+        std::printf("\n    %s(%.3g) %+.2f std of %.2g %%", knot.component.c_str(), knot.strain,
+                    error, 100.0 * knot.std / knot.truth);
       inside += covered;
       ++pairs;
       by_component[knot.component].first += covered;
       ++by_component[knot.component].second;
     }
+    if (arguments.verbose)
+      for (const TestResidual& test : result->tests)
+        std::printf("\n    %s: chi2/dof %.2f, discrepancy %.2g mm", test.measurement.c_str(),
+                    test.chi2_per_dof, 1e3 * test.discrepancy_m);
+    std::printf("\n  %d of %d pairs inside so far\n", inside, pairs);
+    std::fflush(stdout);
   }
   const double coverage = pairs > 0 ? static_cast<double>(inside) / pairs : 0.0;
   std::printf(

@@ -156,6 +156,10 @@ bool FitRun::solve(const std::vector<int>& groups, const std::vector<int>& tests
   last_ = solveOuter(evaluator_, start, chosen);
   outer_iterations += last_.iterations;
   if (!last_.usable) return false;
+  if (last_.blocked)
+    warnings.push_back(stage +
+                       ": even the shortest step led to a frame without a stable equilibrium; the "
+                       "best point so far was kept");
   state_ = space->stateAt(last_.z);
   return true;
 }
@@ -259,15 +263,18 @@ void FitRun::fitGroup(int group) {
 }
 
 /// One block on its own tests; true if there is a point to go on from.
-bool FitRun::refineBlock(const FitBlock& block, int pass) {
+/// @param radius  of the block's trust region: where its shapes held only for short steps, the next
+/// stage does not begin with long ones again.
+bool FitRun::refineBlock(const FitBlock& block, int pass, double& radius) {
   const OuterOptions early{
       .relative_tolerance = kEarlyTolerance, .max_iterations = kEarlyIterations, .progress = {}};
-  const OuterOptions tight{.relative_tolerance = kFinalTolerance,
-                           .max_iterations = options_.max_outer_iterations,
-                           .progress = {}};
+  OuterOptions tight{.relative_tolerance = kFinalTolerance,
+                     .max_iterations = options_.max_outer_iterations,
+                     .progress = {}};
   if (pass == 0) {
     reweigh(block.tests);
     if (!solve(block.groups, block.tests, kEarlyFrames, early, "refinement")) return false;
+    radius = std::min(radius, last_.radius);
     if (evaluator_.cancelled()) return true;
     reweigh(block.tests);
   }
@@ -276,7 +283,10 @@ bool FitRun::refineBlock(const FitBlock& block, int pass) {
     for (const int t : block.tests) tests_[t]->updateDiscrepancy();
     reconsiderShapes(block);
   }
-  return solve(block.groups, block.tests, 0, tight, "all frames");
+  tight.first_radius = radius;
+  if (!solve(block.groups, block.tests, 0, tight, "all frames")) return false;
+  radius = std::min(OuterOptions{}.first_radius, last_.radius);
+  return true;
 }
 
 /// The way from the first guess may have led a frame into another stable shape than the cloth's.
@@ -303,11 +313,12 @@ bool FitRun::refine() {
   refined_ = seenGroups(state_, roles_);
   blocks_ = fitBlocks(state_, roles_);
   if (blocks_.empty()) return false;
+  std::vector<double> radii(blocks_.size(), OuterOptions{}.first_radius);
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     bool settled = true, all_converged = true;
-    for (const FitBlock& block : blocks_) {
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
       if (evaluator_.cancelled()) return true;
-      if (!refineBlock(block, pass)) return false;
+      if (!refineBlock(blocks_[b], pass, radii[b])) return false;
       all_converged = all_converged && last_.converged;
       settled = settled && last_.initial_cost - last_.cost <= negligibleGain();
     }

@@ -74,7 +74,7 @@ class FitRun {
   const std::vector<double>* givenKnots(int group) const;
   bool refine();
   double negligibleGain() const;
-  bool refineBlock(const FitBlock& block, int pass);
+  bool refineBlock(const FitBlock& block, int pass, double& radius);
   void reconsiderShapes(const FitBlock& block);
   void reweigh(const std::vector<int>& tests);
   void noteDropped(int dropped, const std::string& stage);

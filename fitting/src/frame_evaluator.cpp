@@ -6,6 +6,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <numeric>
 #include <set>
 #include <thread>
 #include <utility>
@@ -24,6 +25,9 @@ void compress(Eigen::VectorXd& residuals, Eigen::MatrixXd& jacobian) {
   jacobian = upper.leftCols(columns - 1);
   residuals = upper.col(columns - 1);
 }
+
+/// Solved in vain; frames that did not come to their turn have taken no step.
+bool isLost(const FrameOutcome& outcome) { return !outcome.converged && outcome.newton_steps > 0; }
 
 }  // namespace
 
@@ -57,7 +61,10 @@ void FrameEvaluator::configure(std::shared_ptr<const FitSpace> space, std::vecto
   frames_ = std::move(frames);
   ties_ = space_->ties();
   blocks_.assign(frames_.size(), {});
+  order_.resize(frames_.size());
+  std::iota(order_.begin(), order_.end(), 0);
   valid_ = false;
+  failed_point_.resize(0);
 }
 
 int FrameEvaluator::rawResidualCount(int test) const {
@@ -91,6 +98,7 @@ void FrameEvaluator::evaluateFrame(int index) {
 
 bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
   if (valid_ && z == point_) return true;
+  if (stop_at_failure && failed_point_.size() == z.size() && failed_point_ == z) return false;
   valid_ = false;
   std::set<int> used;
   for (const FrameId& id : frames_) used.insert(id.test);
@@ -100,7 +108,8 @@ bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
   std::atomic<bool> failed{false};
   parallelFor(
       static_cast<int>(frames_.size()), threads_,
-      [&](int i) {
+      [&](int k) {
+        const int i = order_[k];
         evaluateFrame(i);
         if (!blocks_[i].outcome.converged) failed = true;
       },
@@ -110,7 +119,13 @@ bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
     counts_.newton_steps += block.outcome.newton_steps;
     counts_.factorizations += block.outcome.factorizations;
   }
-  if (failed) ++counts_.failures;
+  if (failed) {
+    ++counts_.failures;
+    failed_point_ = z;
+    // The next trial point, if it fails too, is likely to fail at the same frames.
+    std::stable_partition(order_.begin(), order_.end(),
+                          [&](int i) { return isLost(blocks_[i].outcome); });
+  }
   if (failed || cancelled()) return false;
   point_ = z;
   valid_ = true;
@@ -120,9 +135,11 @@ bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
 void FrameEvaluator::requireProof(bool required) {
   for (FitTest* test : tests_) test->requireProof(required);
   valid_ = false;
+  failed_point_.resize(0);
 }
 
 void FrameEvaluator::accept() {
+  failed_point_.resize(0);
   for (FitTest* test : tests_) test->accept();
 }
 

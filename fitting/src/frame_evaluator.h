@@ -43,7 +43,8 @@ class FrameEvaluator {
   int blockRows(int index) const;
 
   /// All chosen frames; false if one has no equilibrium there (or the run was cancelled), then the
-  /// rest may be missing.
+  /// rest may be missing. Frames that failed last are tried first, and a point that failed is not
+  /// tried again from the same warm starts.
   bool evaluate(const Eigen::VectorXd& z, bool stop_at_failure = true);
   /// The point evaluated last becomes the warm start of the next ones.
   void accept();
@@ -74,7 +75,8 @@ class FrameEvaluator {
   std::vector<FrameId> frames_;
   Eigen::MatrixXd ties_;  ///< Parameters by z.
   std::vector<FrameBlock> blocks_;
-  Eigen::VectorXd point_;
+  std::vector<int> order_;  ///< Of evaluation: frames that failed last come first.
+  Eigen::VectorXd point_, failed_point_;
   bool valid_ = false;
   SolveCounts counts_;
 };

@@ -15,9 +15,6 @@ namespace {
 constexpr double kRoundingCost = 1e-18;
 /// Smallest relative change of z that is worth another set of equilibria.
 constexpr double kParameterTolerance = 1e-9;
-/// Damping of the first step is 1 / radius of the diagonal: Ceres' own 1e4 leaves so little of it
-/// that several rejections in a row would change nothing, and each costs a set of equilibria.
-constexpr double kFirstRadius = 100.0;
 /// Two steps in a row that gain less than this share of the cost, or one and then a rejection, mean
 /// that what is left are jumps between shapes: a smooth sum of squares converges quadratically.
 constexpr double kStalledGain = 1e-3;
@@ -86,18 +83,23 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& iteration) override {
     const bool accepted = iteration.iteration == 0 || iteration.step_is_successful;
-    if (accepted) accept(iteration.iteration);
+    if (accepted) {
+      accept(iteration.iteration);
+      summary_.radius = iteration.trust_region_radius;
+    }
     rejected_ = accepted ? 0 : rejected_ + 1;
+    failed_in_a_row_ = ok_ ? 0 : failed_in_a_row_ + 1;
     const bool stalled = rejected_ >= options_.max_rejected_steps ||
                          (!accepted && gain_ < kStalledGain) ||
                          (gain_ < kStalledGain && previous_gain_ < kStalledGain);
+    summary_.blocked = rejected_ >= options_.max_rejected_steps && failed_in_a_row_ >= rejected_;
     summary_.iterations = iteration.iteration;
     if (options_.progress) options_.progress(iteration.iteration, summary_.cost);
     if (evaluator_.cancelled()) return ceres::SOLVER_ABORT;
     const bool exact =
         2.0 * summary_.cost < kRoundingCost * static_cast<double>(evaluator_.blocks().size());
     if (exact || stalled) {
-      summary_.converged = true;
+      summary_.converged = !summary_.blocked;
       return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
     }
     return ceres::SOLVER_CONTINUE;
@@ -121,6 +123,7 @@ class Driver final : public ceres::EvaluationCallback, public ceres::IterationCa
   Eigen::VectorXd trial_, evaluated_;
   bool ok_ = false;
   int rejected_ = 0;
+  int failed_in_a_row_ = 0;  ///< Of those rejected, for want of an equilibrium.
   /// Of the last two accepted steps, as a share of the cost before each.
   double gain_ = 1.0, previous_gain_ = 1.0;
 };
@@ -131,10 +134,12 @@ ceres::Solver::Options solverOptions(const OuterOptions& options, int threads, D
   ceres_options.max_num_iterations = options.max_iterations;
   ceres_options.function_tolerance = options.relative_tolerance;
   ceres_options.gradient_tolerance = 0.0;
-  ceres_options.initial_trust_region_radius = kFirstRadius;
+  ceres_options.initial_trust_region_radius = options.first_radius;
   ceres_options.parameter_tolerance = kParameterTolerance;
-  ceres_options.line_search_interpolation_type = ceres::QUADRATIC;
-  ceres_options.max_num_line_search_step_size_iterations = 5;
+  // Ceres would search along the projected step and, having found a tenth of it acceptable, make
+  // the next one longer: where longer steps lose equilibria every step is searched for anew, at the
+  // price of several sets of equilibria. The trust region remembers.
+  ceres_options.max_num_line_search_step_size_iterations = 0;
   ceres_options.num_threads = threads;
   ceres_options.logging_type = ceres::SILENT;
   ceres_options.callbacks.push_back(&driver);
@@ -182,7 +187,7 @@ OuterSummary solveOuter(FrameEvaluator& evaluator, const Eigen::VectorXd& start,
 
   ceres::Solver::Summary report;
   ceres::Solve(solverOptions(options, evaluator.threads(), driver), &problem, &report);
-  summary.converged = summary.usable && !evaluator.cancelled() &&
+  summary.converged = summary.usable && !summary.blocked && !evaluator.cancelled() &&
                       (summary.converged || report.termination_type == ceres::CONVERGENCE);
   return summary;
 }

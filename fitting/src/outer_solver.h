@@ -26,6 +26,10 @@ struct OuterOptions {
   double relative_tolerance =
       1e-2;  ///< Stop when the cost falls by less between iterations ([Est12] sec. 5.1).
   int max_iterations = 30;
+  /// Of the trust region: the first step is damped by 1 / radius of the diagonal. Ceres' own 1e4
+  /// leaves so little of it that several rejections in a row would change nothing, and each costs a
+  /// set of equilibria.
+  double first_radius = 100.0;
   double misfit = 1.0;  ///< Sum of squares per residual, for the weak belief.
   std::function<void(int iteration, double cost)> progress;
 };
@@ -33,11 +37,13 @@ struct OuterOptions {
 struct OuterSummary {
   Eigen::VectorXd z;  ///< Best point, also when cancelled or not converged.
   double initial_cost = 0.0;
-  double cost = 0.0;  ///< Of the data, half the sum of squares.
+  double cost = 0.0;    ///< Of the data, half the sum of squares.
+  double radius = 0.0;  ///< Of the trust region after the last accepted step.
   int iterations = 0;
   int failed_points = 0;  ///< Trial points where a frame had no equilibrium.
   bool converged = false;
-  bool usable = false;  ///< False when not even the start could be evaluated.
+  bool blocked = false;  ///< Ended because the shortest step, too, had a frame without equilibrium.
+  bool usable = false;   ///< False when not even the start could be evaluated.
 };
 
 /// min over z >= bounds of the sum of squares of the evaluator's frames, by Ceres' trust region

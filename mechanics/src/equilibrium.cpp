@@ -82,6 +82,7 @@ struct EquilibriumSolver::Impl {
   TurningPath path;
   SparseLower held;  ///< Hessian of a sheet that swivels, with one degree of freedom held.
   bool hold_swivel = false;
+  double last_shift = 0.0;    ///< That served, as a share of the stiffest entry.
   double share = 0.0;         ///< Of the projection, to begin with.
   double used_share = 0.0;    ///< Of the projection in the factors at hand.
   bool factors_near = false;  ///< Those are of an exact Hessian close by.
@@ -161,15 +162,16 @@ bool EquilibriumSolver::Impl::factorizeMixed(const ClothState& state, Equilibriu
   }
 }
 
-/// Factorises H + shift I with the smallest shift that serves: the softest direction is then that
-/// of H.
+/// Factorises H + shift I with the smallest shift that serves, searched for from a little below the
+/// last one: the softest direction is then that of H.
 bool EquilibriumSolver::Impl::factorizeShifted(const ClothState& state,
                                                EquilibriumSummary& summary) {
   const SparseLower& h = hessian(state, Projection::kNone);
   const double stiffest = stiffestEntry(h);
-  for (double shift = kLeastShift * stiffest; shift < stiffest; shift *= kShiftGrowth) {
+  const double first = std::max(kLeastShift, last_shift / (kShiftGrowth * kShiftGrowth));
+  for (last_shift = first; last_shift < 1.0; last_shift *= kShiftGrowth) {
     ++summary.factorizations;
-    if (cholesky.factorize(h, shift)) return true;
+    if (cholesky.factorize(h, last_shift * stiffest)) return true;
   }
   return false;
 }
@@ -302,7 +304,7 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
                                : kForceToleranceOfNodeWeight * system.lightestFreeNodeWeight_N();
   double energy = system.energy(state);
   system.gradient(state, g);
-  share = 0.0;
+  share = last_shift = 0.0;
   factors_near = false;
   int saddles = 0;
   for (int k = 0;; ++k) {
