@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <mutex>
 #include <numeric>
 #include <stdexcept>
 #include <string_view>
@@ -115,7 +116,13 @@ struct SparseCholesky::Impl {
     matrix.dtype = CHOLMOD_DOUBLE;
     matrix.sorted = 1;
     matrix.packed = 1;
-    analyze();
+    {
+      // METIS draws from the C library's one generator, which it seeds first: two orderings at once
+      // would be of chance, and with them the last bits of all solutions.
+      static std::mutex one_at_a_time;
+      const std::lock_guard lock(one_at_a_time);
+      analyze();
+    }
     const int* chosen = static_cast<const int*>(factor->Perm);
     order.assign(chosen, chosen + pattern.size);
     cholmod_free_factor(&factor, &common);
