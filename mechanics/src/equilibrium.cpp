@@ -82,6 +82,7 @@ struct EquilibriumSolver::Impl {
   TurningPath path;
   SparseLower held;  ///< Hessian of a sheet that swivels, with one degree of freedom held.
   bool hold_swivel = false;
+  bool turning = true;        ///< Steps follow `path`, not a straight line.
   double last_shift = 0.0;    ///< That served, as a share of the stiffest entry.
   double share = 0.0;         ///< Of the projection, to begin with.
   double used_share = 0.0;    ///< Of the projection in the factors at hand.
@@ -97,6 +98,7 @@ struct EquilibriumSolver::Impl {
   bool factorizeShifted(const ClothState& state, EquilibriumSummary& summary);
   double fullStep(const ClothState& state) const;
   double energyAt(const ClothState& state, double alpha, ClothState& place) const;
+  void choosePath(const ClothState& state, double alpha, double energy);
   void rescale(const ClothState& state, double factor, double& alpha, double& e);
   bool lineSearch(ClothState& state, double& energy);
   bool stepWithOldFactors(ClothState& state, double& energy);
@@ -186,16 +188,29 @@ double EquilibriumSolver::Impl::fullStep(const ClothState& state) const {
   return std::min(1.0, sizeOf(state) / 3.0 / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
 }
 
-/// Energy at the state moved by alpha step, along a path that turns triangles instead of stretching
-/// them; `place` is left there.
+/// Energy at the state moved by alpha step; `place` is left there.
 double EquilibriumSolver::Impl::energyAt(const ClothState& state, double alpha,
                                          ClothState& place) const {
   place = state;
   system.advance(place, step, alpha);
+  if (!turning) return system.energy(place);
   const int nodes = system.sheet().nodeCount();
   const Points3 from = state.positions(nodes);
   Eigen::Map<Points3>(place.q.data(), 3, nodes) = path.moved(from, place.positions(nodes) - from);
   return system.energy(place);
+}
+
+/// A path that turns triangles instead of stretching them leads to lower energy where a sheet
+/// bends, a straight one where strain is to be taken out of it: that of the longer step that lowers
+/// it.
+void EquilibriumSolver::Impl::choosePath(const ClothState& state, double alpha, double energy) {
+  for (int k = 0; k < kMaxBacktracks; ++k, alpha *= 0.5) {
+    turning = true;
+    if (energyAt(state, alpha, trial) < energy) return;
+    turning = false;
+    if (energyAt(state, alpha, trial) < energy) return;
+  }
+  turning = true;
 }
 
 /// Multiplies alpha by `factor` as long as that lowers the energy `e` at `trial`.
@@ -232,6 +247,7 @@ bool EquilibriumSolver::Impl::stepWithOldFactors(ClothState& state, double& ener
 bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
   const double slope = g.dot(step);
   double alpha = fullStep(state);
+  choosePath(state, alpha, energy);
   const double rounding = 1e-13 * std::max(std::abs(energy), std::abs(slope));
   const double before = residual(g);
   const auto agreement = [&](double e) {
