@@ -71,8 +71,9 @@ MaterialComponent componentOf(const FitRun& run, const FitState& state, const Fi
   if (assumed || !contains(space.groups(), g)) return component;  // stays kAssumed
   component.status = ComponentStatus::kFitted;
   if (statistics)
-    addKnotStatistics(component, knotStatistics(space, z, statistics->covariance, g),
-                      group.factors[place]);
+    addKnotStatistics(
+        component, knotStatistics(space, z, statistics->covariance, statistics->data_covariance, g),
+        group.factors[place]);
   return component;
 }
 
@@ -83,7 +84,7 @@ ParameterCovariance covarianceOf(const FitSpace& space, const FitStatistics& sta
       .covariance = scale.asDiagonal() * statistics.covariance * scale.asDiagonal()};
   // Rows of what the data do not see are left out of the file's promise.
   for (Eigen::Index i = 0; i < scale.size(); ++i)
-    if (statistics.covariance(i, i) > kUnseenCoefficientVariance) {
+    if (statistics.data_covariance(i, i) > kUnseenCoefficientVariance) {
       result.covariance.row(i).setZero();
       result.covariance.col(i).setZero();
     }

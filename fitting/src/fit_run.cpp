@@ -31,8 +31,6 @@ constexpr int kEarlyIterations = 10;
 constexpr double kSettledGain = 1e-4, kSettledMisfits = 0.05, kMostSettledGain = 1e-2;
 constexpr int kMaxPasses = 6;
 constexpr double kRefitGain = 0.2;
-/// A first guess may be far off; that is not noise.
-constexpr double kLargestMisfit = 100.0;
 /// Ranges narrower than this share of their place hold one knot only.
 constexpr double kNarrowRange = 1e-6;
 /// Sum of squares per residual below which data are met to rounding and knots cannot help.
@@ -146,8 +144,7 @@ bool FitRun::solve(const std::vector<int>& groups, const std::vector<int>& tests
   long residuals = 0;
   for (const int t : tests) residuals += evaluator_.rawResidualCount(t);
   OuterOptions chosen = outer;
-  chosen.misfit =
-      std::min(kLargestMisfit, 2.0 * evaluator_.cost() / static_cast<double>(residuals));
+  chosen.misfit = 2.0 * evaluator_.cost() / static_cast<double>(residuals);
   chosen.progress = [&](int iteration, double cost) {
     if (!options_.progress) return;
     options_.progress(

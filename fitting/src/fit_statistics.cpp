@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "outer_solver.h"
+
 namespace tenter {
 namespace {
 
@@ -24,8 +26,7 @@ constexpr double kLeastLeft = 0.05;
 /// Terms of a combination lighter than this are not listed.
 constexpr double kLightTerm = 0.1;
 
-/// Keeps the equations of z regular where no data speak. The belief that a fit goes by is left out:
-/// a band says what was measured.
+/// Keeps the equations of z regular where no data speak.
 Eigen::MatrixXd vagueInformation(int size) {
   return Eigen::MatrixXd::Identity(size, size) / (kVagueRelativeStd * kVagueRelativeStd);
 }
@@ -103,6 +104,40 @@ Eigen::MatrixXd disagreement(const TestInformation& test, const Eigen::MatrixXd&
   return widened * widened * sum;
 }
 
+/// What the fit of each block knew besides its data (outer_solver.h).
+struct Belief {
+  Eigen::MatrixXd information;  ///< In the equations, as the fit weighed it.
+  Eigen::MatrixXd noise;        ///< In the middle of the sandwich, as misfit widens the data's.
+};
+
+Belief beliefOf(const FitSpace& space, const std::vector<FitBlock>& blocks,
+                const std::vector<TestInformation>& tests) {
+  const int n = space.size();
+  Belief belief{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n)};
+  for (const FitBlock& block : blocks) {
+    double chi2 = 0.0, residuals = 0.0;
+    for (const int t : block.tests) {
+      chi2 += tests[t].chi2;
+      residuals += tests[t].residuals;
+    }
+    std::vector<int> groups;
+    for (const int g : block.groups)
+      if (space.offset(g) >= 0) groups.push_back(g);
+    const FitSpace own(space.state(), groups);
+    const double misfit = chi2 / std::max(1.0, residuals);
+    const Prior prior = weakPrior(own, misfit);
+    const Eigen::MatrixXd information = prior.matrix.transpose() * prior.matrix;
+    for (const int g : groups) {
+      const int count = space.state().groups[g].basis->size();
+      const auto part = information.block(own.offset(g), own.offset(g), count, count);
+      belief.information.block(space.offset(g), space.offset(g), count, count) = part;
+      belief.noise.block(space.offset(g), space.offset(g), count, count) =
+          std::max(1.0, misfit) * part;
+    }
+  }
+  return belief;
+}
+
 std::vector<bool> entriesAtBound(const FitSpace& space, const Eigen::VectorXd& z) {
   const Eigen::VectorXd lower = space.lowerBounds();
   std::vector<bool> at_bound(z.size());
@@ -137,6 +172,19 @@ Eigen::MatrixXd covarianceOf(const Eigen::MatrixXd& inverse, const Eigen::Matrix
   return root * root.transpose();
 }
 
+/// Covariance of z. What rests on its bound holds still for the others, but is itself no better
+/// known for it.
+Eigen::MatrixXd sandwich(const Eigen::MatrixXd& equations, const Eigen::MatrixXd& noise,
+                         const std::vector<bool>& at_bound) {
+  Eigen::MatrixXd covariance = covarianceOf(inverseOfFree(equations, at_bound), noise);
+  const std::vector<bool> none(at_bound.size(), false);
+  if (at_bound == none) return covariance;
+  const Eigen::MatrixXd all = covarianceOf(inverseOfFree(equations, none), noise);
+  for (Eigen::Index i = 0; i < all.rows(); ++i)
+    if (at_bound[i]) covariance(i, i) = all(i, i);
+  return covariance;
+}
+
 }  // namespace
 
 FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<FitBlock>& blocks,
@@ -161,33 +209,34 @@ FitStatistics fitStatistics(const FrameEvaluator& evaluator, const std::vector<F
     const bool by_law = evaluator.tests()[t]->discrepancy_m() > 0.0;
     if (by_law || test.chi2_per_dof > kMissedByLaw) noise += disagreement(test, information);
   }
-  statistics.covariance = covarianceOf(inverse, noise);
-  // What rests on its bound holds still for the others, but is itself no better known for it.
-  const std::vector<bool> none(statistics.at_bound.size(), false);
-  if (statistics.at_bound != none) {
-    const Eigen::MatrixXd all = covarianceOf(inverseOfFree(equations, none), noise);
-    for (Eigen::Index i = 0; i < all.rows(); ++i)
-      if (statistics.at_bound[i]) statistics.covariance(i, i) = all(i, i);
-  }
+  statistics.data_covariance = sandwich(equations, noise, statistics.at_bound);
+  const Belief belief = beliefOf(evaluator.space(), blocks, statistics.tests);
+  statistics.covariance =
+      sandwich(equations + belief.information, noise + belief.noise, statistics.at_bound);
   return statistics;
 }
 
 KnotStatistics knotStatistics(const FitSpace& space, const Eigen::VectorXd& z,
-                              const Eigen::MatrixXd& covariance, int group) {
+                              const Eigen::MatrixXd& covariance,
+                              const Eigen::MatrixXd& data_covariance, int group) {
   const ParameterGroup& g = space.state().groups[group];
   const Eigen::MatrixXd map = g.reference * g.basis->knotValueMap();
   const int begin = space.offset(group), count = g.basis->size();
   KnotStatistics knots;
   knots.value = map * z.segment(begin, count);
-  knots.std = (map * covariance.block(begin, begin, count, count) * map.transpose())
-                  .diagonal()
-                  .cwiseMax(0.0)
-                  .cwiseSqrt();
+  const auto stdBy = [&](const Eigen::MatrixXd& of_z) -> Eigen::VectorXd {
+    return (map * of_z.block(begin, begin, count, count) * map.transpose())
+        .diagonal()
+        .cwiseMax(0.0)
+        .cwiseSqrt();
+  };
+  knots.std = stdBy(covariance);
+  const Eigen::VectorXd by_data = stdBy(data_covariance);
   double floor = kSmallKnot * knots.value.cwiseAbs().maxCoeff();
   // A coupling may well be 0: its error refers to what would matter.
   if (g.may_be_negative) floor = std::max(floor, g.reference);
   for (int i = 0; i < knots.value.size(); ++i)
-    knots.observed.push_back(knots.std[i] <=
+    knots.observed.push_back(by_data[i] <=
                              kSeenRelativeStd * std::max(floor, std::abs(knots.value[i])));
   return knots;
 }
@@ -204,7 +253,7 @@ nlohmann::json identifiabilityJson(const FitSpace& space, const FitStatistics& s
       names.push_back(space.state().groupName(g));
       coefficients.push_back(j);
     }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(statistics.covariance);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(statistics.data_covariance);
   for (int i = 0; i < space.size(); ++i) {
     const Eigen::VectorXd direction = eigen.eigenvectors().col(i);
     const double relative_std = std::sqrt(std::max(0.0, eigen.eigenvalues()[i]));
@@ -267,7 +316,7 @@ nlohmann::json scatterOfGroup(const FitSpace& space, const std::vector<Specimen>
                               int group) {
   std::vector<KnotStatistics> each;
   for (const Specimen& s : specimens)
-    each.push_back(knotStatistics(space, s.z, s.covariance, group));
+    each.push_back(knotStatistics(space, s.z, s.covariance, s.covariance, group));
   const std::vector<double>& strains = space.state().groups[group].basis->knots();
   nlohmann::json knots = nlohmann::json::array();
   for (std::size_t k = 0; k < strains.size(); ++k) {

@@ -44,8 +44,11 @@ struct TestInformation {
 struct FitStatistics {
   std::vector<TestInformation> tests;
   std::vector<bool> at_bound;  ///< Of each entry of z.
-  Eigen::MatrixXd covariance;  ///< Of z. Misfit beyond the noise widens it, test by
-                               ///< test, and so does disagreement between runs of frames.
+  /// Of z as the fit determined it, from the data and its weak belief. Misfit beyond the noise
+  /// widens it, test by test, and so does disagreement between runs of frames.
+  Eigen::MatrixXd covariance;
+  /// What the data alone would leave open: it tells what they see.
+  Eigen::MatrixXd data_covariance;
 };
 
 /// Of the point that the evaluator evaluated last, with all its frames valid.
@@ -58,9 +61,11 @@ struct KnotStatistics {
   Eigen::VectorXd value, std;
   std::vector<bool> observed;
 };
-/// @param covariance  of z, as FitStatistics has it.
+/// @param covariance  of z, for the standard deviations.
+/// @param data_covariance  of z, for what is seen.
 KnotStatistics knotStatistics(const FitSpace& space, const Eigen::VectorXd& z,
-                              const Eigen::MatrixXd& covariance, int group);
+                              const Eigen::MatrixXd& covariance,
+                              const Eigen::MatrixXd& data_covariance, int group);
 
 /// material.fit["identifiability"]: combinations of coefficients with their relative standard
 /// deviation, seen or not.

@@ -4,6 +4,7 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -13,6 +14,8 @@ namespace {
 /// Below this sum of squares per residual the data are met to rounding; relative progress means
 /// nothing any more.
 constexpr double kRoundingCost = 1e-18;
+/// A first guess may be far off; that is not noise in which a belief would be measured.
+constexpr double kLargestMisfit = 100.0;
 /// Smallest relative change of z that is worth another set of equilibria.
 constexpr double kParameterTolerance = 1e-9;
 /// Two steps in a row that gain less than this share of the cost, or one and then a rejection, mean
@@ -161,7 +164,7 @@ Prior weakPrior(const FitSpace& space, double misfit) {
     prior.matrix.block(n + begin, begin, count, count) =
         root.asDiagonal() * eigen.eigenvectors().transpose();
   }
-  const double weight = std::sqrt(misfit) / kPriorRelativeStd;
+  const double weight = std::sqrt(std::min(misfit, kLargestMisfit)) / kPriorRelativeStd;
   prior.matrix *= weight;
   prior.offset *= weight;
   return prior;
