@@ -19,6 +19,7 @@
 #include "tenter/core/files.h"
 #include "tenter/reconstruction/image_session.h"
 #include "tenter/session/mounting.h"
+#include "tenter/session/rest_pictures.h"
 #include "tenter/twin/fabrics.h"
 #include "tenter/twin/served_rig.h"
 
@@ -134,10 +135,8 @@ Result<void> keepTruth(const StateFolder& state, const std::string& folder) {
 
 /// What the cameras look at, their calibration, and the sample at rest, where a session has them.
 Result<void> keepScene(const StateFolder& state, const fs::path& session) {
-  std::error_code copied;
   if (fs::exists(state / kRestFolder)) {
-    fs::copy(state / kRestFolder, session / kRestFolder, fs::copy_options::recursive, copied);
-    if (copied) return badInput((session / kRestFolder).string(), "", copied.message());
+    if (auto kept = addRestPictures(session, state / kRestFolder); !kept) return kept.error();
   }
   for (const auto& [from, to] : {std::pair("mounting.json", kMountingFile),
                                  std::pair("calibration.json", kSessionCalibrationFile)}) {

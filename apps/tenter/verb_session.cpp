@@ -3,6 +3,7 @@
 
 #include "output_guard.h"
 #include "session_forces.h"
+#include "tenter/session/rest_pictures.h"
 #include "tenter/session/session_export.h"
 #include "tenter/session/session_reader.h"
 #include "tenter/session/session_writer.h"
@@ -12,8 +13,10 @@ namespace tenter::app {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 struct Options {
-  std::string session, output, target;
+  std::string session, output, target, pictures;
 };
 
 void declareSession(CLI::App& command, Options& o) {
@@ -28,6 +31,13 @@ void declareExport(CLI::App& command, Options& o) {
   declareSession(command, o);
   command.add_option("--to", o.target, "Format:" + targets)->required();
   command.add_option("-o,--output", o.output, "File to write")->required();
+}
+
+void declareRest(CLI::App& command, Options& o) {
+  declareSession(command, o);
+  command.add_option("pictures", o.pictures,
+                     "Folder with CAMERA.png, as tenter rig snap writes it; without it those that "
+                     "lie in the session's own rest/");
 }
 
 double seconds(std::int64_t time_ns) { return 1e-9 * static_cast<double>(time_ns); }
@@ -47,9 +57,11 @@ nlohmann::json countsOf(const SessionReport& report) {
           {"cut_records", report.cut_records},
           {"repairs", report.repairs},
           {"stray_files", report.stray_files},
+          {"rest_pictures", report.rest_pictures},
           {"duration_s", seconds(report.duration_ns)},
           {"closed", report.closed},
           {"ok", report.ok()},
+          {"notes", report.notes},
           {"problems", report.problems}};
 }
 
@@ -97,6 +109,7 @@ Result<int> verify(const Options& o, Console& console) {
   if (!report) return report.error();
   console.answer = countsOf(*report);
   sayCounts(*report, console);
+  for (const std::string& note : report->notes) console.say("note: " + note);
   for (const std::string& problem : report->problems) console.say("problem: " + problem);
   console.say(o.session + (report->ok() ? ": ok" : ": damaged"));
   return report->ok() ? kDone : static_cast<int>(ErrorKind::kBadInput);
@@ -120,6 +133,18 @@ Result<int> repair(const Options& o, Console& console) {
   return kDone;
 }
 
+Result<int> rest(const Options& o, Console& console) {
+  const auto files = addRestPictures(
+      o.session, o.pictures.empty() ? fs::path(o.session) / kRestFolder : fs::path(o.pictures));
+  if (!files) return files.error();
+  console.answer["files"] = nlohmann::json::array();
+  for (const FrameFile& file : *files) {
+    console.answer["files"].push_back({{"name", file.name}, {"sha256", file.sha256}});
+    console.say(file.name + "  " + file.sha256);
+  }
+  return kDone;
+}
+
 Result<int> exportTo(const Options& o, Console& console) {
   const auto target = findSessionExport(o.target);
   if (!target) return target.error();
@@ -140,6 +165,8 @@ Verb sessionVerb() {
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSession, verify); }},
       Verb{"repair", "Cut a torn tail off, keep it beside, and say what it was",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSession, repair); }},
+      Verb{"rest", "Put pictures of the sample at rest into a session and their hashes on record",
+           [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareRest, rest); }},
       sessionReplay(),
       sessionForces(),
       Verb{"export", "Write a session for other programs",

@@ -8,6 +8,7 @@
 #include "carried_warp.h"
 #include "displacement_fill.h"
 #include "parallel_for.h"
+#include "tracked_covariance.h"
 
 namespace tenter {
 
@@ -65,11 +66,10 @@ struct ClothTracker::State {
         carried(rest.mesh) {}
 
   Result<void> prepare(const std::vector<GrayImage>& images);
-  Result<void> follow(std::size_t v, const GrayImage& image,
-                      std::vector<std::vector<Sighting>>& seen,
-                      std::vector<std::vector<std::size_t>>& places, ClothFrame& frame);
-  void locate(int vertex, std::vector<Sighting>& seen, std::vector<std::size_t>& places,
-              ClothFrame& frame) const;
+  Result<void> follow(std::size_t v, const GrayImage& image, std::vector<TrackedSightings>& seen,
+                      ClothFrame& frame);
+  void locate(int vertex, TrackedSightings& seen, ClothFrame& frame) const;
+  Mat3 covarianceOf(int vertex, const TrackedSightings& seen, const Points3& positions_m) const;
 };
 
 Result<void> ClothTracker::State::prepare(const std::vector<GrayImage>& images) {
@@ -111,9 +111,7 @@ Result<void> ClothTracker::State::prepare(const std::vector<GrayImage>& images) 
 
 /// Finds a view's subsets in its next image and adds what it shows to the vertices' sightings.
 Result<void> ClothTracker::State::follow(std::size_t v, const GrayImage& image,
-                                         std::vector<std::vector<Sighting>>& seen,
-                                         std::vector<std::vector<std::size_t>>& places,
-                                         ClothFrame& frame) {
+                                         std::vector<TrackedSightings>& seen, ClothFrame& frame) {
   TrackedView& view = tracked[v];
   const auto field = view.tracker->track(image);
   if (!field) {
@@ -124,64 +122,65 @@ Result<void> ClothTracker::State::follow(std::size_t v, const GrayImage& image,
   for (const std::string& warning : field->warnings) {
     frame.warnings.push_back(views[v].name + ": " + warning);
   }
-  // A match's covariance holds the noise of the image at rest already, and with the other sign that
-  // moved the sighting at rest: only what that errs beyond its matches comes on top.
-  const double beyond = 1.0 - 1.0 / (surface.inflation * surface.inflation);
   for (std::size_t i = 0; i < view.vertices.size(); ++i) {
     const CorrelatedPoint& point = field->points[i];
     const int vertex = view.vertices[i];
     if (!point.valid()) {
-      if (seen[vertex].empty()) frame.states[vertex] = point.state;
+      if (seen[vertex].now.empty()) frame.states[vertex] = point.state;
       continue;
     }
     const SubsetWarp& warp = point.match.warp;
-    const Mat2 linear = warp.linear();
-    const Mat2& rest = surface.vertices[vertex].sightings[view.places[i]].sighting.covariance_px2;
-    seen[vertex].push_back(
-        {static_cast<int>(v), point.position + warp.displacement(),
-         point.match.covariance_px2 + beyond * linear * rest * linear.transpose()});
-    places[vertex].push_back(view.places[i]);
+    seen[vertex].now.push_back(
+        {static_cast<int>(v), point.position + warp.displacement(), point.match.covariance_px2});
+    seen[vertex].places.push_back(view.places[i]);
+    seen[vertex].now_from_rest_px.push_back(warp.linear());
     frame.zncc[vertex] = std::min(frame.zncc[vertex], static_cast<float>(point.match.zncc));
   }
   return {};
 }
 
 /// Triangulates a vertex from where its views show it; drops what contradicts the others.
-void ClothTracker::State::locate(int vertex, std::vector<Sighting>& seen,
-                                 std::vector<std::size_t>& places, ClothFrame& frame) const {
+void ClothTracker::State::locate(int vertex, TrackedSightings& seen, ClothFrame& frame) const {
   const Vec3 guess = last.col(vertex);
-  while (seen.size() >= 2) {
-    const auto point = triangulate(views, seen, &guess);
+  while (seen.now.size() >= 2) {
+    const auto point = triangulate(views, seen.now, &guess);
     if (!point) {
       frame.states[vertex] = PointState::kNotFound;
       return;
     }
-    std::size_t worst = seen.size();
+    std::size_t worst = seen.now.size();
     double worst_excess = 0.0;
-    for (std::size_t k = 0; k < seen.size(); ++k) {
-      const auto projected = views[seen[k].view].project(point->position_m);
+    for (std::size_t k = 0; k < seen.now.size(); ++k) {
+      const auto projected = views[seen.now[k].view].project(point->position_m);
       if (!projected) continue;
-      const Vec2 grown = seen[k].pixel - *projected - rest_residuals[vertex][places[k]];
-      const double allowed = kGrowth_px + kGrowthSigmas * std::sqrt(seen[k].covariance_px2.trace());
+      const Vec2 grown = seen.now[k].pixel - *projected - rest_residuals[vertex][seen.places[k]];
+      const double allowed =
+          kGrowth_px + kGrowthSigmas * std::sqrt(seen.now[k].covariance_px2.trace());
       const double excess = grown.norm() / allowed;
       if (excess > 1.0 && excess > worst_excess) {
         worst = k;
         worst_excess = excess;
       }
     }
-    if (worst == seen.size()) {
+    if (worst == seen.now.size()) {
       frame.positions_m.col(vertex) = point->position_m;
-      frame.covariances_m2[vertex] = point->covariance_m2;
       frame.residual_px[vertex] = static_cast<float>(point->residual_px);
-      frame.views[vertex] = static_cast<std::uint8_t>(seen.size());
+      frame.views[vertex] = static_cast<std::uint8_t>(seen.now.size());
       frame.states[vertex] = PointState::kValid;
       return;
     }
     frame.states[vertex] = PointState::kOutlier;
-    if (seen.size() == 2) return;
-    seen.erase(seen.begin() + static_cast<std::ptrdiff_t>(worst));
-    places.erase(places.begin() + static_cast<std::ptrdiff_t>(worst));
+    if (seen.now.size() == 2) return;
+    seen.drop(worst);
   }
+}
+
+Mat3 ClothTracker::State::covarianceOf(int vertex, const TrackedSightings& seen,
+                                       const Points3& positions_m) const {
+  const Mat3 gradient = carried.gradient(vertex, positions_m);
+  const Vec3 at = positions_m.col(vertex);
+  return trackedCovariance(views, surface, vertex, at, seen, gradient) +
+         surface.systematicAt(vertex, at, seen.now, gradient);
 }
 
 ClothTracker::ClothTracker(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -202,8 +201,7 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
                                        const std::vector<KnownVertex>& known) {
   State& s = *state_;
   const std::size_t count = s.surface.vertices.size();
-  std::vector<std::vector<Sighting>> seen(count);
-  std::vector<std::vector<std::size_t>> places(count);
+  std::vector<TrackedSightings> seen(count);
   ClothFrame frame = matchedFrame(s.surface);
   for (std::size_t i = 0; i < count; ++i) {
     frame.zncc[i] = 1.0F;
@@ -212,12 +210,11 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
   }
   for (std::size_t v = 0; v < s.views.size(); ++v) {
     if (!s.tracked[v].tracker || images[v].width == 0) continue;
-    auto followed = s.follow(v, images[v], seen, places, frame);
+    auto followed = s.follow(v, images[v], seen, frame);
     if (!followed) return followed.error();
   }
-  parallelFor(count, s.options.correlate.threads, [&](std::size_t i, std::size_t) {
-    s.locate(static_cast<int>(i), seen[i], places[i], frame);
-  });
+  parallelFor(count, s.options.correlate.threads,
+              [&](std::size_t i, std::size_t) { s.locate(static_cast<int>(i), seen[i], frame); });
   std::vector<std::uint8_t> found(count);
   for (std::size_t i = 0; i < count; ++i) found[i] = frame.states[i] == PointState::kValid;
   for (const KnownVertex& vertex : known) {
@@ -228,11 +225,8 @@ Result<ClothFrame> ClothTracker::track(const std::vector<GrayImage>& images,
   }
   frame.filled_m = s.fill.complete(frame, s.last);
   parallelFor(count, s.options.correlate.threads, [&](std::size_t i, std::size_t) {
-    const auto vertex = static_cast<int>(i);
     if (found[i] != 0)
-      frame.covariances_m2[i] +=
-          s.surface.systematicAt(vertex, frame.positions_m.col(vertex), seen[i],
-                                 s.carried.gradient(vertex, frame.positions_m));
+      frame.covariances_m2[i] = s.covarianceOf(static_cast<int>(i), seen[i], frame.positions_m);
   });
   s.last = frame.positions_m;
   return frame;

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "tenter/core/files.h"
+#include "tenter/session/rest_pictures.h"
 
 namespace tenter {
 
@@ -50,6 +51,9 @@ Result<void> readJournal(SessionReader& reader, ImageSession& session,
       samples.push_back({(*record)->time_ns, *sample});
       continue;
     }
+    auto rest = restPicturesIn((*record)->body);
+    if (!rest) return rest.error().in((session.folder / "journal.jsonl").string());
+    if (rest->has_value()) session.rest_pictures = std::move(*rest);
     const auto* frame = std::get_if<FrameRecord>(&(*record)->body);
     if (!frame) continue;
     SessionMoment moment;
@@ -90,20 +94,38 @@ void attachSamples(const std::vector<TimedSample>& samples, ImageSession& sessio
   }
 }
 
+/// What lies at rest beside a session that has no record of it, from before there were such
+/// records.
+Result<std::optional<FrameFile>> unrecordedRest(const fs::path& session, const std::string& name) {
+  std::error_code failed;
+  if (!fs::exists(session / name, failed)) return std::optional<FrameFile>();
+  const auto bytes = readFile(session / name);
+  if (!bytes) return bytes.error();
+  return std::optional(FrameFile{name, sha256(*bytes), bytes->size()});
+}
+
 /// Pictures from before the session, of the sample at rest; they come before its frames.
 Result<void> addRest(ImageSession& session) {
   const fs::path folder = session.folder / kRestFolder;
   std::error_code failed;
-  if (session.mounting.rest_frame || !fs::is_directory(folder, failed)) return {};
+  if (session.mounting.rest_frame) return {};
+  if (!session.rest_pictures && !fs::is_directory(folder, failed)) return {};
   SessionMoment rest;
   rest.frame = -1;
   rest.files.resize(session.views.size());
   for (std::size_t v = 0; v < session.views.size(); ++v) {
-    const std::string name = session.views[v].name + ".png";
-    if (!fs::exists(folder / name, failed)) continue;
-    const auto bytes = readFile(folder / name);
-    if (!bytes) return bytes.error();
-    rest.files[v] = FrameFile{std::string(kRestFolder) + "/" + name, sha256(*bytes), bytes->size()};
+    const std::string name = std::string(kRestFolder) + "/" + session.views[v].name + ".png";
+    if (session.rest_pictures) {
+      const auto& known = *session.rest_pictures;
+      const auto file = std::find_if(known.begin(), known.end(),
+                                     [&](const FrameFile& f) { return f.name == name; });
+      if (file != known.end()) rest.files[v] = *file;
+    } else {
+      auto file = unrecordedRest(session.folder, name);
+      if (!file) return file.error();
+      rest.files[v] = std::move(*file);
+    }
+    if (!rest.files[v]) continue;
     session.identity += "\n" + rest.files[v]->name + "=" + rest.files[v]->sha256;
   }
   session.moments.insert(session.moments.begin(), std::move(rest));

@@ -26,7 +26,7 @@ std::size_t imagesIn(const std::vector<GrayImage>& images) {
 
 /// What finished frames depend on.
 /// Goes up when frames come out otherwise than before: what an older program kept is done again.
-constexpr int kMethod = 3;
+constexpr int kMethod = 4;
 
 std::string identityOf(const ImageSession& session, const SessionReconstruction& o) {
   const CorrelateOptions& c = o.surface.correlate;

@@ -8,6 +8,7 @@
 #include "coarse_surface.h"
 #include "grid_mesh.h"
 #include "parallel_for.h"
+#include "shape_error.h"
 #include "sheet_heights.h"
 #include "subset_centres.h"
 #include "surface_warp.h"
@@ -23,7 +24,11 @@ constexpr double kCell_px = 4.0;
 /// Passes of matching: the first from the coarse surface, the last on the exact nodes.
 constexpr int kPasses = 2;
 /// Passes of matching what the surface's own shape has been taken out of.
-constexpr int kWarpPasses = 2;
+constexpr int kWarpPasses = 3;
+/// How far heights are smoothed between them each way, in subsets' sides, but at least so many
+/// nodes.
+constexpr double kSmoothing = 0.6;
+constexpr int kLeastReach = 2;
 /// Places tried for texture that occurs again, each way, and the correlation that counts.
 constexpr int kRepeatPlaces = 3;
 constexpr double kRepeats = 0.85;
@@ -134,6 +139,14 @@ void judgeResiduals(const std::vector<CameraView>& views, RestSurface& surface) 
   }
 }
 
+/// A subset does not see a height that scatters within it, so what views are laid over must not.
+SurfacePasses passesOver(const SheetGrid& grid, const SurfaceOptions& options, double pixel_m) {
+  const MatchOptions& match = options.correlate.match;
+  const double side_cells = match.subset_px * pixel_m / grid.spacing_m.mean();
+  const int reach = static_cast<int>(std::lround(kSmoothing * side_cells));
+  return {match.order, 0.5 * side_cells, std::max(kLeastReach, reach), kWarpPasses};
+}
+
 Result<RestSurface> surfaceOn(const std::vector<CameraView>& views,
                               const std::vector<GrayImage>& images, const SurfaceOptions& options,
                               const SheetGrid& grid, const HeightField& coarse, double pixel_m) {
@@ -150,10 +163,10 @@ Result<RestSurface> surfaceOn(const std::vector<CameraView>& views,
     matchNodes(grid, heights, matcher, options, vertices);
     heights.refine(vertices, pixel_m);
   }
-  // A subset does not see a height that scatters within it, so what it is laid over must not.
-  const double reach_m = 0.5 * options.correlate.match.subset_px * pixel_m;
-  for (int pass = 0; pass < kWarpPasses; ++pass) {
-    const SheetHeights smooth = heights.smoothed(reach_m);
+  const SheetHeights first = heights;
+  const SurfacePasses passes = passesOver(grid, options, pixel_m);
+  for (int pass = 0; pass < passes.passes; ++pass) {
+    const SheetHeights smooth = heights.smoothed(passes.reach);
     SurfaceWarp(views, images, options, grid, smooth).refine(vertices);
     heights.refine(vertices, pixel_m);
   }
@@ -162,6 +175,7 @@ Result<RestSurface> surfaceOn(const std::vector<CameraView>& views,
   if (!surface) return surface;
   surface->pixel_m = pixel_m;
   judgeResiduals(views, *surface);
+  addShapeErrors(views, grid, first, heights, passes, *surface);
   if (surface->validCount() >= kLeastVertices) return surface;
   return badInput(
       "", "",

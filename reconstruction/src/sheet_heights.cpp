@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "height_filter.h"
+
 namespace tenter {
 
 namespace {
@@ -21,7 +23,42 @@ double medianOf(std::vector<double> values) {
   return *middle;
 }
 
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+
+/// Of a node so many columns and rows off the middle of a quadric.
+struct QuadricTerms {
+  double weight;
+  Vec6 terms;
+
+  QuadricTerms(int column, int row, int reach) {
+    const double x = static_cast<double>(column) / (reach + 1);
+    const double y = static_cast<double>(row) / (reach + 1);
+    weight = (1.0 - x * x) * (1.0 - y * y);
+    terms << 1.0, x, y, x * x, x * y, y * y;
+  }
+};
+
 }  // namespace
+
+Eigen::MatrixXd quadricWeights(int reach) {
+  Mat6 normal = Mat6::Zero();
+  for (int j = -reach; j <= reach; ++j) {
+    for (int i = -reach; i <= reach; ++i) {
+      const QuadricTerms at(i, j, reach);
+      normal.noalias() += at.weight * at.terms * at.terms.transpose();
+    }
+  }
+  const Vec6 first = normal.ldlt().solve(Vec6::Unit(0));
+  Eigen::MatrixXd weights(2 * reach + 1, 2 * reach + 1);
+  for (int j = -reach; j <= reach; ++j) {
+    for (int i = -reach; i <= reach; ++i) {
+      const QuadricTerms at(i, j, reach);
+      weights(i + reach, j + reach) = at.weight * first.dot(at.terms);
+    }
+  }
+  return weights;
+}
 
 SheetHeights::SheetHeights(const SheetGrid& grid, const HeightField& coarse)
     : grid_(grid),
@@ -113,39 +150,55 @@ void SheetHeights::refine(std::vector<RestVertex>& vertices, double pixel_m) {
   fill();
 }
 
-double SheetHeights::quadricAt(int node, const Eigen::Vector2i& reach) const {
-  using Vec6 = Eigen::Matrix<double, 6, 1>;
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+double SheetHeights::quadricAt(int node, int reach) const {
+  Mat6 normal = Mat6::Zero();
   Vec6 right = Vec6::Zero();
   const int column = node % grid_.columns, row = node / grid_.columns;
   int count = 0;
-  for (int j = -reach.y(); j <= reach.y(); ++j) {
-    for (int i = -reach.x(); i <= reach.x(); ++i) {
+  for (int j = -reach; j <= reach; ++j) {
+    for (int i = -reach; i <= reach; ++i) {
       const int c = column + i, r = row + j;
       if (c < 0 || r < 0 || c >= grid_.columns || r >= grid_.rows) continue;
       const int other = r * grid_.columns + c;
       if (!known(other)) continue;
-      const double x = static_cast<double>(i) / (reach.x() + 1);
-      const double y = static_cast<double>(j) / (reach.y() + 1);
-      const double weight = (1.0 - x * x) * (1.0 - y * y);
-      const Vec6 terms{1.0, x, y, x * x, x * y, y * y};
-      normal.noalias() += weight * terms * terms.transpose();
-      right += weight * heights_[other] * terms;
+      const QuadricTerms at(i, j, reach);
+      normal.noalias() += at.weight * at.terms * at.terms.transpose();
+      right += at.weight * heights_[other] * at.terms;
       ++count;
     }
   }
   if (count < kLeastForQuadric) return heights_[node];
-  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> factors(normal);
+  const Eigen::LDLT<Mat6> factors(normal);
   const double height = factors.solve(right)[0];
   return factors.info() == Eigen::Success && std::isfinite(height) ? height : heights_[node];
 }
 
-SheetHeights SheetHeights::smoothed(double reach_m) const {
+SheetHeights SheetHeights::smoothed(int reach) const {
   SheetHeights out = *this;
-  const Eigen::Vector2i reach =
-      (reach_m * grid_.spacing_m.cwiseInverse()).cast<int>().cwiseMax(Eigen::Vector2i::Ones());
   for (int node = 0; node < static_cast<int>(heights_.size()); ++node) {
     if (known(node)) out.heights_[node] = quadricAt(node, reach);
+  }
+  return out;
+}
+
+SheetHeights SheetHeights::seenBySubsets(const SubsetWeights& subset, int order) const {
+  SheetHeights out = *this;
+  for (int node = 0; node < static_cast<int>(heights_.size()); ++node) {
+    if (!known(node)) continue;
+    const int column = node % grid_.columns, row = node / grid_.columns;
+    double seen = 0.0;
+    for (int j = -subset.half; j <= subset.half; ++j) {
+      const std::size_t y = static_cast<std::size_t>(j + subset.half);
+      for (int i = -subset.half; i <= subset.half; ++i) {
+        const std::size_t x = static_cast<std::size_t>(i + subset.half);
+        double weight = subset.mean[x] * subset.mean[y];
+        if (order > 1)
+          weight =
+              subset.quadratic[x] * subset.mean[y] + subset.mean[x] * subset.quadratic[y] - weight;
+        seen += weight * extrapolated(column + i, row + j);
+      }
+    }
+    out.heights_[node] = seen;
   }
   return out;
 }

@@ -9,6 +9,11 @@
 
 namespace tenter {
 
+struct SubsetWeights;
+
+/// What each height counts in that of a quadric at the middle, all being known; 2 reach + 1 square.
+Eigen::MatrixXd quadricWeights(int reach);
+
 /// Heights of a surface at the nodes of a grid in its plane, as matches make them better.
 class SheetHeights {
  public:
@@ -18,9 +23,11 @@ class SheetHeights {
   /// become outliers, nodes without a match are filled from those around them.
   void refine(std::vector<RestVertex>& vertices, double pixel_m);
 
-  /// With each height that of a quadric through those around it, up to `reach_m` away, which nearer
-  /// ones pull at more.
-  SheetHeights smoothed(double reach_m) const;
+  /// With each height that of a quadric through those up to `reach` nodes away, which nearer ones
+  /// pull at more.
+  SheetHeights smoothed(int reach) const;
+  /// With each height what an affine or a quadratic subset around it sees, of that order.
+  SheetHeights seenBySubsets(const SubsetWeights& subset, int order) const;
 
   bool known(int node) const { return known_[static_cast<std::size_t>(node)] != 0; }
   /// Whether a match, and not what lies around it, says how high a node is.
@@ -30,6 +37,9 @@ class SheetHeights {
   SurfaceElement elementAt(const Vec2& place_m) const;
   /// Height at the node of a column and row; beyond the border, as its outermost two go on.
   double extrapolated(int column, int row) const;
+  int count() const { return static_cast<int>(heights_.size()); }
+  double height(int node) const { return heights_[static_cast<std::size_t>(node)]; }
+  void setHeight(int node, double height_m) { heights_[static_cast<std::size_t>(node)] = height_m; }
   /// Nearest node of a place.
   int nodeNear(const Vec2& place_m) const;
 
@@ -38,7 +48,7 @@ class SheetHeights {
   Vec2 slope(int node) const;
   void dropOutliers(std::vector<RestVertex>& vertices, double pixel_m);
   void fill();
-  double quadricAt(int node, const Eigen::Vector2i& reach) const;
+  double quadricAt(int node, int reach) const;
 
   const SheetGrid& grid_;
   std::vector<double> heights_;

@@ -122,7 +122,10 @@ void avoidClips(const std::vector<CameraView>& views, const std::vector<MountedC
       const auto middle = freeSquare(at.head<2>(), halfSubset(view, element, subset_px), free);
       if (!middle) continue;
       const auto seen = viewElement(view, element);
+      const Vec2 before = s.centre;
       s.centre = s.sighting.pixel + seen->pixel_from_tangents * (*middle - at.head<2>());
+      const Vec2 apart = (s.centre - before).cwiseAbs() / subset_px;
+      s.shared = (Vec2::Ones() - apart).cwiseMax(0.0).prod();
       kept.push_back(s);
     }
     vertex.sightings = std::move(kept);

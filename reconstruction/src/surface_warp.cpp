@@ -164,6 +164,7 @@ void SurfaceWarp::apply(const std::vector<std::pair<int, Correction>>& correctio
   const auto point = triangulate(views_, sightings, &vertex.point.position_m);
   if (!point || point->residual_px > options_.max_residual_px) return;
   refined.point = *point;
+  refined.warped = true;
   vertex = std::move(refined);
 }
 

@@ -13,9 +13,7 @@ namespace tenter {
 namespace format = session_format;
 namespace fs = std::filesystem;
 
-namespace {
-
-Result<void> storeOne(const fs::path& session, const FrameFile& file, std::string_view bytes) {
+Result<void> storeFile(const fs::path& session, const FrameFile& file, std::string_view bytes) {
   const fs::path target = session / file.name;
   const fs::path part = target.string() + format::kPartSuffix;
   if (auto done = writeNewFile(part, bytes); !done) return done;
@@ -26,8 +24,6 @@ Result<void> storeOne(const fs::path& session, const FrameFile& file, std::strin
   fs::remove(part, ignored);
   return badInput(target.string(), "", "cannot be put in place: " + error.message());
 }
-
-}  // namespace
 
 Result<void> checkImages(std::span<const FrameImage> images) {
   if (images.empty() || images.size() > format::kMaxFrameFiles) {
@@ -54,7 +50,7 @@ Result<FrameRecord> storeImages(const fs::path& session, std::int64_t frame,
   for (const FrameImage& image : images) {
     FrameFile file{format::frameFileName(frame, image.camera, image.extension), sha256(image.bytes),
                    image.bytes.size()};
-    if (auto done = storeOne(session, file, image.bytes); !done) {
+    if (auto done = storeFile(session, file, image.bytes); !done) {
       removeImages(session, record);
       return done.error();
     }

@@ -36,6 +36,15 @@ bool isFrameFileName(std::string_view name) {
          isExtension(name.substr(dot + 1));
 }
 
+bool isRestFileName(std::string_view name) {
+  constexpr std::string_view kPrefix = "rest/", kSuffix = ".png";
+  if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return false;
+  if (name.size() < kPrefix.size() + kSuffix.size()) return false;
+  name.remove_prefix(kPrefix.size());
+  name.remove_suffix(kSuffix.size());
+  return isCameraName(name);
+}
+
 std::string padded(std::uint64_t number, std::size_t digits) {
   std::string text = std::to_string(number);
   if (text.size() < digits) text.insert(0, digits - text.size(), '0');

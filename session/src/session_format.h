@@ -21,6 +21,7 @@ inline constexpr const char* kPartSuffix = ".part";
 inline constexpr const char* kBegin = "begin";
 inline constexpr const char* kResumed = "resumed";
 inline constexpr const char* kClosed = "closed";
+inline constexpr const char* kRest = "rest";  ///< Kind of record.
 
 inline constexpr std::size_t kMaxName = 200;
 inline constexpr std::size_t kMaxText = 4096;
@@ -38,6 +39,8 @@ inline bool isNameCharacter(char c) {
 
 /// "frames/000012-left.png": nothing else may name a file, lest a journal point out of its session.
 bool isFrameFileName(std::string_view name);
+/// "rest/left.png".
+bool isRestFileName(std::string_view name);
 /// Parts of such a name.
 bool isCameraName(std::string_view name);
 bool isExtension(std::string_view name);

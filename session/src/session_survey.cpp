@@ -10,6 +10,7 @@
 #include "record_codec.h"
 #include "session_format.h"
 #include "tenter/core/json_reader.h"
+#include "tenter/session/rest_pictures.h"
 
 namespace tenter {
 
@@ -51,6 +52,7 @@ class Surveyor {
     }
     checkSequence(*record, lineName(line));
     count(*record);
+    readRest(*record, lineName(line));
   }
 
   JournalSurvey finish() {
@@ -103,6 +105,14 @@ class Surveyor {
     JsonReader in(*data, format::kJournalFile);
     survey_.session_id = in.textOr("session", "");
     survey_.header_sha256 = in.textOr("header_sha256", "");
+  }
+
+  void readRest(const JournalRecord& record, const std::string& place) {
+    auto rest = restPicturesIn(record.body);
+    if (!rest) return complain(place + ": " + rest.error().message());
+    if (!rest->has_value()) return;
+    if (survey_.rest) return complain(place + ": names pictures at rest again");
+    survey_.rest = std::move(*rest);
   }
 
   void count(const JournalRecord& record) {

@@ -15,6 +15,7 @@ struct JournalSurvey {
   std::uint64_t next_sequence = 0;
   std::int64_t last_time_ns = 0;  ///< Largest of all.
   std::vector<FrameRecord> frames;
+  std::optional<std::vector<FrameFile>> rest;  ///< Pictures at rest, if a record names them.
   TornTail tail;
   bool lacks_line_end = false;      ///< The last record is whole but for the end of its line.
   std::uint64_t damaged_lines = 0;  ///< Before the tail.

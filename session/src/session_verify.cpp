@@ -7,6 +7,7 @@
 #include "session_repair.h"
 #include "session_survey.h"
 #include "tenter/core/files.h"
+#include "tenter/session/rest_pictures.h"
 #include "tenter/session/session_reader.h"
 
 namespace tenter {
@@ -28,6 +29,7 @@ SessionReport reportOf(const JournalSurvey& survey) {
   report.cut_records = survey.tail.cut_records;
   report.duration_ns = survey.last_time_ns;
   report.closed = survey.closed && survey.tail.cut_bytes == 0;
+  report.rest_pictures = survey.rest ? survey.rest->size() : 0;
   report.problems = survey.problems;
   return report;
 }
@@ -108,6 +110,29 @@ void checkFrames(const fs::path& folder, const JournalSurvey& survey, SessionRep
   }
 }
 
+/// Sessions from before there was a record of them, or pictures that were copied in by hand.
+void checkRest(const fs::path& folder, const JournalSurvey& survey, SessionReport& report) {
+  std::set<std::string> named;
+  if (survey.rest) {
+    for (const FrameFile& file : *survey.rest) {
+      named.insert(file.name);
+      if (const std::string complaint = imageComplaint(folder, file); !complaint.empty())
+        report.problems.push_back(file.name + ": " + complaint);
+    }
+  }
+  std::set<std::string> unnamed;
+  std::error_code failed;
+  fs::directory_iterator entry(folder / kRestFolder, failed);
+  for (const fs::directory_iterator end; !failed && entry != end; entry.increment(failed)) {
+    const std::string name = std::string(kRestFolder) + "/" + entry->path().filename().string();
+    if (!named.contains(name)) unnamed.insert(name);
+  }
+  for (const std::string& name : unnamed)
+    report.notes.push_back(name +
+                           ": no record has its SHA-256, so whether it was changed is not "
+                           "known");
+}
+
 }  // namespace
 
 Result<SessionReport> inspectSession(const fs::path& folder) {
@@ -127,6 +152,7 @@ Result<SessionReport> verifySession(const fs::path& folder) {
   if (!report) return report;
   if (auto done = checkHeader(folder, *header, survey, *report); !done) return done.error();
   checkFrames(folder, survey, *report);
+  checkRest(folder, survey, *report);
   limitProblems(*report);
   return report;
 }

@@ -175,6 +175,28 @@ Result<ResumedSession> SessionWriter::resume(const fs::path& folder,
   return open(folder, now, false);
 }
 
+Result<std::unique_ptr<SessionWriter>> SessionWriter::amend(const fs::path& folder) {
+  auto header = readSessionHeader(folder);
+  if (!header) return header.error();
+  const fs::path file = folder / format::kJournalFile;
+  auto lock = lockJournal(file);
+  if (!lock) return lock.error();
+  auto survey = surveyJournal(folder, *header);
+  if (!survey) return survey.error();
+  if (auto done = checkIdentity(folder, *header, *survey); !done) return done.error();
+  if (survey->tail.cut_bytes > 0 || survey->lacks_line_end || survey->records == 0)
+    return badInput(file.string(), "", "ends in a torn record", "tenter session repair");
+  auto state = std::make_unique<State>();
+  state->folder = folder;
+  state->journal = JournalFile::open(
+      file, std::move(*lock), static_cast<std::int64_t>(survey->tail.offset_bytes),
+      survey->next_sequence, std::chrono::nanoseconds(header->commit_interval_ns));
+  state->header = std::move(*header);
+  state->last_time_ns = survey->last_time_ns;
+  state->next_frame = frameAfter(survey->frames);
+  return std::unique_ptr<SessionWriter>(new SessionWriter(std::move(state)));
+}
+
 Result<RepairReport> SessionWriter::repair(const fs::path& folder,
                                            std::chrono::system_clock::time_point now) {
   auto opened = open(folder, now, true);

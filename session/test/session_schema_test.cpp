@@ -10,6 +10,7 @@
 #include "journal_line.h"
 #include "record_codec.h"
 #include "session_samples.h"
+#include "tenter/session/rest_pictures.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
 #include "tenter/test_support/temporary_folder.h"
@@ -40,6 +41,8 @@ TEST(SessionSchemaTest, WrittenSessionsAreValid) {
   // Opened again, so that there is a "resumed" record too.
   folder.write("s/journal.jsonl", slurp(folder / "s/journal.jsonl") + "torn");
   ASSERT_TRUE(SessionWriter::repair(folder / "s").ok());
+  folder.write("snap/left.png", "picture");
+  ASSERT_TRUE(addRestPictures(folder / "s", folder / "snap").ok());
   EXPECT_THAT(schemaErrors(json::parse(slurp(folder / "s/session.json")), kHeaderSchema),
               IsEmpty());
   for (const JournalRecord& record : readAll(folder / "s")) {
@@ -60,6 +63,8 @@ TEST(SessionSchemaTest, SeesWhatIsWrong) {
                              R"({"seq":-1,"time_ns":2,"kind":"trace","data":{}})",
                              R"({"seq":1,"time_ns":2,"kind":"event","event":"party","data":{}})",
                              R"({"seq":1,"time_ns":2,"kind":"frame","frame":0,"files":[]})",
+                             R"({"seq":1,"time_ns":2,"kind":"rest","data":{}})",
+                             R"({"seq":1,"time_ns":2,"kind":"rest","data":{"files":[]}})",
                              R"({"seq":1,"time_ns":2,"kind":"trace","data":7})"}) {
     EXPECT_THAT(schemaErrors(json::parse(record), kRecordSchema), Not(IsEmpty())) << record;
   }
@@ -117,12 +122,17 @@ TEST(SessionPythonTest, TheReaderSeesDamage) {
   if (!fs::exists("/usr/bin/python3")) GTEST_SKIP() << "/usr/bin/python3 is not installed";
   const TemporaryFolder folder;
   writeSession(folder / "s");
+  folder.write("snap/left.png", "picture");
+  ASSERT_TRUE(addRestPictures(folder / "s", folder / "snap").ok());
+  EXPECT_THAT(readWithPython(folder / "s"), Not(HasSubstr("problem")));
+  folder.write("s/rest/left.png", "altered");
   std::string journal = slurp(folder / "s/journal.jsonl");
   journal[journal.find("\"seq\":4") + 2] ^= 1;
   folder.write("s/journal.jsonl", journal);
   folder.write("s/frames/000000-left.png", "other");
   const std::string output = readWithPython(folder / "s");
-  EXPECT_THAT(output, HasSubstr("32 records, 0 bytes cut"));
+  EXPECT_THAT(output, HasSubstr("34 records, 0 bytes cut"));
+  EXPECT_THAT(output, HasSubstr("problem: rest/left.png: has another SHA-256"));
   EXPECT_THAT(output, HasSubstr("problem: line 5: its CRC does not fit"));
   EXPECT_THAT(output, HasSubstr("problem: frames/000000-left.png: has another SHA-256"));
 }

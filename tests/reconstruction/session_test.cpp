@@ -9,6 +9,7 @@
 #include "tenter/core/files.h"
 #include "tenter/core/measurement.h"
 #include "tenter/reconstruction/image_session.h"
+#include "tenter/session/rest_pictures.h"
 #include "tenter/session/session_writer.h"
 #include "tenter/test_support/temporary_folder.h"
 
@@ -143,7 +144,16 @@ TEST(ReconstructSession, PicturesFromBeforeItWasHungAreTheReference) {
   for (std::size_t f = 0; f < one->frames.size(); ++f) {
     EXPECT_EQ(one->frames[f].positions, other->frames[f].positions);
   }
-  // Without them the first frame stands in, which is said.
+  // With their hashes on record one that was altered since is left out, which is said.
+  ASSERT_TRUE(addRestPictures(folder / "R", folder / "R/rest").ok());
+  const auto altered = fs::directory_iterator(folder / "R/rest")->path();
+  ASSERT_TRUE(writeFileAtomically(altered, *readFile(altered) + "x").ok());
+  const Outcome noticed = reconstruct(folder, "R", "P");
+  EXPECT_EQ(noticed.exit_code, 0) << noticed.err;
+  EXPECT_THAT(noticed.out, HasSubstr(altered.filename().string() + ": is not the image"));
+  // Without a record and without them the first frame stands in, which is said.
+  fs::remove_all(folder / "R");
+  splitOffTheRest(folder / "S", folder / "R");
   fs::remove_all(folder / "R/rest");
   const Outcome without = reconstruct(folder, "R", "O");
   EXPECT_EQ(without.exit_code, 0) << without.err;

@@ -8,7 +8,8 @@ import re
 import sys
 import zlib
 
-FRAME = re.compile(r"frames/[0-9]{6,16}-[A-Za-z0-9_-]{1,64}\.[a-z0-9]{1,8}")
+IMAGE = {"frame": re.compile(r"frames/[0-9]{6,16}-[A-Za-z0-9_-]{1,64}\.[a-z0-9]{1,8}"),
+         "rest": re.compile(r"rest/[A-Za-z0-9_-]{1,64}\.png")}
 
 
 def whole(line):
@@ -37,9 +38,10 @@ def read_session(folder):
             records.append(record)
     session["records"], session["cut_bytes"], session["problems"] = records, tail, problems
     for record in records:
-        for file in record["files"] if record["kind"] == "frame" else []:
+        named = record["data"] if record["kind"] == "rest" else record
+        for file in named["files"] if record["kind"] in ("frame", "rest") else []:
             image = folder / file["name"]
-            if not FRAME.fullmatch(file["name"]) or not image.is_file():
+            if not IMAGE[record["kind"]].fullmatch(file["name"]) or not image.is_file():
                 problems.append(f"{file['name']}: is missing")
             elif hashlib.sha256(image.read_bytes()).hexdigest() != file["sha256"]:
                 problems.append(f"{file['name']}: has another SHA-256 than its record")

@@ -13,9 +13,6 @@
 
 namespace tenter {
 
-/// Folder in a session with "CAMERA.png": the sample as it lay flat before it was hung.
-inline constexpr const char* kRestFolder = "rest";
-
 /// One set of images and what the rig felt nearest to its moment.
 struct SessionMoment {
   std::int64_t frame = 0, time_ns = 0;
@@ -32,6 +29,8 @@ struct ImageSession {
   CameraCalibration calibration;
   std::vector<CameraView> views;
   std::vector<SessionMoment> moments;  ///< In the order of their frames.
+  /// Pictures of the sample as it lay flat before it was hung, if the session has a record of them.
+  std::optional<std::vector<FrameFile>> rest_pictures;
   std::vector<std::string> warnings;
   std::string identity;  ///< Changes when the session or its calibration does.
 

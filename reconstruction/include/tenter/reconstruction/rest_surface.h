@@ -23,6 +23,16 @@ struct SurfaceOptions {
 struct VertexSighting {
   Sighting sighting;
   Vec2 centre = Vec2::Zero();
+  /// What share of that subset's pixels those are by which the sighting was found.
+  double shared = 1.0;
+};
+
+/// The noise of heights that come of passes over the surface, in the variance that their last
+/// matches alone give them (docs/reconstruction.md).
+struct HeightNoise {
+  double own = 1.0;            ///< Variance.
+  double with_match = 1.0;     ///< Covariance with that of the last matches.
+  double with_tracking = 1.0;  ///< Covariance with what following the same subsets makes of it.
 };
 
 /// A vertex of the mesh at rest.
@@ -31,6 +41,11 @@ struct RestVertex {
   SpacePoint point;                       ///< If valid.
   std::vector<VertexSighting> sightings;  ///< The views that show it; at least two if valid.
   double zncc = 0.0;                      ///< Least of those between views.
+  bool warped = false;  ///< Matched with the surface's shape taken out, by heights around it.
+  /// Heights of this vertex: how much a displacement changes them, and the direction in which they
+  /// err, along which that is 1.
+  Vec3 normal = Vec3::Zero(), ray = Vec3::Zero();
+  double shape_variance_m2 = 0.0;  ///< Of the height, beyond noise: what a subset does not follow.
   /// Of its place at rest, where a systematic error is known (RestSurface::systematic).
   SystematicError::PlaceRows by_parameters;
 };
@@ -43,6 +58,7 @@ struct RestSurface {
   std::vector<int> node_of_vertex;
   double pixel_m = 0.0;      ///< What a pixel covers, the median.
   double residual_px = 0.0;  ///< Median over valid vertices.
+  HeightNoise height_noise;  ///< Of vertices that are `warped`.
   /// What sightings' sigmas fall short of their residuals, at least 1, where each view's offset
   /// that varies linearly over its image is left out ...
   double inflation = 1.0;

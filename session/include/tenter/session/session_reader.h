@@ -53,6 +53,8 @@ struct SessionReport {
   std::uint64_t stray_files = 0;  ///< In frames/ without a record; a kill while writing leaves one.
   std::int64_t duration_ns = 0;   ///< Largest time of a record.
   bool closed = false;            ///< The last record says that the session ended as it should.
+  std::uint64_t rest_pictures = 0;    ///< Of the sample at rest, on record.
+  std::vector<std::string> notes;     ///< What is worth knowing and no problem: "place: what".
   std::vector<std::string> problems;  ///< "place: what", at most 1000 and then how many more.
   bool ok() const { return problems.empty(); }
 };
@@ -61,8 +63,9 @@ struct SessionReport {
 Result<SessionReport> inspectSession(const std::filesystem::path& folder);
 
 /// Checks everything: the header's hash, every line's CRC, sequence numbers and values, every
-/// image's presence, size and SHA-256, the repair reports. A tail torn by a crash is no problem, it
-/// is counted; whole lines that are wrong are. Error: no session there, or an invalid header.
+/// image's presence, size and SHA-256, those at rest included, the repair reports. A tail torn by a
+/// crash is no problem, it is counted; whole lines that are wrong are. Error: no session there, or
+/// an invalid header.
 Result<SessionReport> verifySession(const std::filesystem::path& folder);
 
 }  // namespace tenter

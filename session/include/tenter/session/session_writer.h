@@ -58,6 +58,10 @@ class SessionWriter {
   static Result<ResumedSession> resume(
       const std::filesystem::path& folder,
       std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
+  /// Opens a whole session to add what became known only afterwards; unlike resume it records
+  /// nothing of its own, and the session's time stands still. Error as there, or the session is
+  /// torn.
+  static Result<std::unique_ptr<SessionWriter>> amend(const std::filesystem::path& folder);
   /// Repairs a session and closes it again; one that is whole is left as it is.
   static Result<RepairReport> repair(
       const std::filesystem::path& folder,
