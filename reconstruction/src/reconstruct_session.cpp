@@ -8,6 +8,7 @@
 #include "partial_store.h"
 #include "rig_reader.h"
 #include "subset_centres.h"
+#include "tenter/session/rest_pictures.h"
 
 namespace tenter {
 
