@@ -177,8 +177,8 @@ void tell(const Options& o, const InversionProblem& problem, const InversionResu
   for (const char* key :
        {"status", "reason", "force_residual_rel", "force_rounding_rel", "cone_violations",
         "cone_margin_min", "lambda_min_per_s2", "negative_eigenvalues", "redrape_max_rel",
-        "seconds", "solve_cpu_seconds", "factorizations", "stretch_max", "bend_max_rad",
-        "load_balanced", "proof", "range"}) {
+        "seconds", "solve_cpu_seconds", "forces_cpu_seconds", "factorizations", "stretch_max",
+        "bend_max_rad", "load_balanced", "proof", "range"}) {
     if (certificate.contains(key)) console.answer[key] = certificate.at(key);
   }
   const Certificate& c = r.certificate;

@@ -27,6 +27,10 @@ constexpr int kMaxChoices = 5;
 /// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
 constexpr double kLambdaFloor_per_s2 = 0.05;
 
+double cpuSecondsSince(std::clock_t start) {
+  return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+}
+
 class Inverter {
  public:
   Inverter(const InversionProblem& problem, const InversionOptions& options, InverseShell shell)
@@ -38,7 +42,9 @@ class Inverter {
       out_.proof = findSlidingProof(problem_.contacts, problem_.material.gravity_m_per_s2);
     if (out_.proof) return finish();
     if (options_.method == InversionMethod::kReference) return reference();
+    const std::clock_t before = std::clock();
     auto contact_forces = ContactForces::create(shell_, newton_);
+    out_.forces_cpu_seconds += cpuSecondsSince(before);
     if (!contact_forces) return contact_forces.error();
     for (const ConeMargin& margin : kMargins) {
       forgetRest();
@@ -83,8 +89,10 @@ class Inverter {
   /// has moved them too far.
   bool balance(ContactForces& contact_forces, double load) {
     for (int k = 0; k < kMaxChoices && !stopped(); ++k) {
+      const std::clock_t before = std::clock();
       auto f = contact_forces.solve(newton_.gradient(unknowns_, load), margin_, load,
                                     [this] { return stopped(); });
+      out_.forces_cpu_seconds += cpuSecondsSince(before);
       out_.factorizations += f.factorizations;
       say("contact forces chosen: %.0f, %.0f factorizations", f.converged ? 1.0 : 0.0,
           f.factorizations);
@@ -151,7 +159,7 @@ class Inverter {
     out_.rest = unknowns_.rest;
     out_.rotations = unknowns_.rotations;
     out_.contact_forces = newton_.contactForces(newton_.gradient(unknowns_, 1.0));
-    out_.solve_cpu_seconds = static_cast<double>(std::clock() - start_cpu_) / CLOCKS_PER_SEC;
+    out_.solve_cpu_seconds = cpuSecondsSince(start_cpu_);
     say("solved after %.3g s", seconds());
     CertificateOptions c;
     c.redrapes = options_.redrapes;

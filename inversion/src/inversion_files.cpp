@@ -160,6 +160,7 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
       {"load_balanced", result.load_balanced},
       {"seconds", result.seconds},
       {"solve_cpu_seconds", result.solve_cpu_seconds},
+      {"forces_cpu_seconds", result.forces_cpu_seconds},
       {"factorizations", result.factorizations},
       {"provenance", provenance}};
   if (range != nullptr) out["range"] = rangeToJson(*range);

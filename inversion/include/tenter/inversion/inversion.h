@@ -56,6 +56,7 @@ struct InversionResult {
   double seconds = 0.0;  ///< Wall clock, with the certificate.
   double solve_cpu_seconds =
       0.0;  ///< Processor time of the program until the rest shape was there.
+  double forces_cpu_seconds = 0.0;  ///< Of those, for the convex choice of contact forces.
   int factorizations = 0;
   int drapes = 0;  ///< Of the reference method.
 };
