@@ -12,6 +12,8 @@ constexpr double kTwinNearness_N = 0.05;
 constexpr double kTwinNearness = 0.2;  // of the last weight
 // A slack cord reads a little below zero, and a moment later may be taut.
 constexpr double kSlack_N = 0.025;
+// Between two readings of a slow bus a load may grow or shrink by so much and flip as well.
+constexpr double kFarTwin = 3.0;
 // Floats with exchanged words are mostly far too large or far too small. No amplifier resolves
 // this.
 constexpr double kSmallestWeight_N = 1e-6;
@@ -58,12 +60,22 @@ bool LoadCellPlausibility::isStuck(const DecodedWeights& weights, std::int64_t s
          stamp_ns - raw_since_ns_ >= stuck_after_ns_;
 }
 
+/// Whether a reading that is not near the last believed one has the wrong sign. Once one was seen,
+/// any of that sign is, however far the load has moved since.
+bool LoadCellPlausibility::isFlipped(double gross_N) const {
+  const bool grown_taut = gross_N > 0.0 && *last_N_ > -kSlack_N;
+  if (isNear(-gross_N, *last_N_)) return !grown_taut;
+  const bool opposite = gross_N * *last_N_ < 0.0 && std::abs(gross_N) > kTwinNearness_N;
+  if (opposite && flipped_) return true;
+  return opposite && *last_N_ > kTwinNearness_N && -gross_N > *last_N_ / kFarTwin &&
+         -gross_N < *last_N_ * kFarTwin;
+}
+
 LoadCellFault LoadCellPlausibility::judgeValue(const DecodedWeights& weights) const {
   const double gross_N = tension_N(weights.gross_N);
   const double swapped_N = tension_N(weights.swapped_gross_N);
   if (last_N_ && !isNear(gross_N, *last_N_)) {
-    const bool grown_taut = gross_N > 0.0 && *last_N_ > -kSlack_N;
-    if (isNear(-gross_N, *last_N_) && !grown_taut) return LoadCellFault::kSignFlip;
+    if (isFlipped(gross_N)) return LoadCellFault::kSignFlip;
     if (isNear(swapped_N, *last_N_)) return LoadCellFault::kWordOrder;  // false for NaN
   }
   const bool tiny = gross_N != 0.0 && std::abs(gross_N) < kSmallestWeight_N;
@@ -89,6 +101,8 @@ LoadCellFault LoadCellPlausibility::judge(const DecodedWeights& weights, std::in
   }
   if (fault == LoadCellFault::kNone && stuck) fault = LoadCellFault::kStuck;
   if (startsProbation(fault)) good_to_come_ = kProbationSamples;
+  if (fault == LoadCellFault::kNone || fault == LoadCellFault::kSignFlip)
+    flipped_ = fault == LoadCellFault::kSignFlip;
   if (fault != LoadCellFault::kNone) return fault;
   if (good_to_come_ > 0 && !passesProbation(gross_N)) return LoadCellFault::kProbation;
   last_N_ = gross_N;

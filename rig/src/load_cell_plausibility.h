@@ -22,6 +22,7 @@ class LoadCellPlausibility {
 
  private:
   LoadCellFault judgeValue(const DecodedWeights& weights) const;
+  bool isFlipped(double gross_N) const;
   bool isStuck(const DecodedWeights& weights, std::int64_t stamp_ns);
   bool passesProbation(double gross_N);
   double tension_N(double weight_N) const { return reversed_ ? -weight_N : weight_N; }
@@ -35,6 +36,7 @@ class LoadCellPlausibility {
   std::int64_t raw_since_ns_ = 0;
   int same_raw_ = 0;
   int good_to_come_;
+  bool flipped_ = false;  // the last value that was looked at had the wrong sign
 };
 
 }  // namespace tenter

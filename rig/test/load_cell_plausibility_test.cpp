@@ -68,6 +68,28 @@ TEST_F(PlausibilityTest, AFlippedSignIsNamedAndProbationFollows) {
   believe(3.0);
 }
 
+TEST_F(PlausibilityTest, AFlippedSignStaysOneWhileTheCordIsLetOut) {
+  believe(1.5);
+  for (double tension_N = 1.5; tension_N > 0.06; tension_N -= 0.01)
+    ASSERT_EQ(see(-tension_N), Fault::kSignFlip) << tension_N;
+  for (int i = 0; i < 30; ++i) ASSERT_EQ(see(-0.3), Fault::kSignFlip);
+  believe(0.3);
+}
+
+TEST_F(PlausibilityTest, AFlippedSignIsSeenThoughTheLoadMovesBetweenReadings) {
+  for (const double now_N : {0.4, 0.7, 1.5, 2.5}) {
+    plausibility_ = LoadCellPlausibility(config());
+    believe(1.0);
+    EXPECT_EQ(see(-now_N), Fault::kSignFlip) << now_N;
+  }
+}
+
+TEST_F(PlausibilityTest, AZeroThatHasDriftedIsReachedStepByStep) {
+  believe(0.4);
+  for (double tension_N = 0.36; tension_N > -0.4; tension_N -= 0.05)
+    ASSERT_EQ(see(tension_N), Fault::kNone) << tension_N;
+}
+
 TEST_F(PlausibilityTest, ACordThatGrowsTautFromAReadingBelowZeroIsBelieved) {
   for (const double slack_N : {-0.005, -0.012, -0.024}) {
     for (const double taut_N : {0.045, 0.05, 0.055, 0.06, 0.07}) {
