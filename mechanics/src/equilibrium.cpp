@@ -34,6 +34,9 @@ constexpr double kInVain = 0.1, kTooLong = 0.25, kAsForeseen = 0.5, kTooShort = 
 constexpr double kLongestReach = 0.04;  ///< Of steps that are made longer, in the sheet's size.
 constexpr double kArmijo = 1e-4;
 constexpr int kMaxBacktracks = 40;
+/// After so many shortened steps in a row, or so many steps at all, they are straight, and full
+/// ones may raise the energy so often before they pay.
+constexpr int kCreeping = 8, kPatience = 60, kWatchdog = 4;
 constexpr int kMaxSaddles = 20;
 constexpr int kInverseIterations = 6;
 constexpr double kGoldenAngle = 2.399963;  ///< Starts inverse iteration without a symmetry.
@@ -82,23 +85,31 @@ struct EquilibriumSolver::Impl {
   TurningPath path;
   SparseLower held;  ///< Hessian of a sheet that swivels, with one degree of freedom held.
   bool hold_swivel = false;
-  bool turning = true;        ///< Steps follow `path`, not a straight line.
   double last_shift = 0.0;    ///< That served, as a share of the stiffest entry.
   double share = 0.0;         ///< Of the projection, to begin with.
   double used_share = 0.0;    ///< Of the projection in the factors at hand.
   bool factors_near = false;  ///< Those are of an exact Hessian close by.
   Eigen::VectorXd g, trial_g, step;
+  int short_steps = 0;    ///< In a row.
+  bool straight = false;  ///< Turning triangles did not serve.
+  /// Last state from which the energy has to fall, and the Newton step there (watchdog).
+  struct Reference {
+    ClothState state;
+    double energy = 0.0;
+    Eigen::VectorXd g, step;
+    int steps_since = 0;
+  } reference;
   ClothState trial, other;
 
   const SparseLower& hessian(const ClothState& state, Projection projection);
   double roundingOfForces(const ClothState& state);
+  bool tryFullStep(ClothState& state, double& energy);
   double residual(const Eigen::VectorXd& gradient) const { return gradient.cwiseAbs().maxCoeff(); }
   bool newtonDirection(const ClothState& state, EquilibriumSummary& summary, bool from_exact);
   bool factorizeMixed(const ClothState& state, EquilibriumSummary& summary);
   bool factorizeShifted(const ClothState& state, EquilibriumSummary& summary);
   double fullStep(const ClothState& state) const;
   double energyAt(const ClothState& state, double alpha, ClothState& place) const;
-  void choosePath(const ClothState& state, double alpha, double energy);
   void rescale(const ClothState& state, double factor, double& alpha, double& e);
   bool lineSearch(ClothState& state, double& energy);
   bool stepWithOldFactors(ClothState& state, double& energy);
@@ -188,29 +199,17 @@ double EquilibriumSolver::Impl::fullStep(const ClothState& state) const {
   return std::min(1.0, sizeOf(state) / 3.0 / std::max(step.cwiseAbs().maxCoeff(), 1e-300));
 }
 
-/// Energy at the state moved by alpha step; `place` is left there.
+/// Energy at the state moved by alpha step, along a path that turns triangles instead of stretching
+/// them; `place` is left there.
 double EquilibriumSolver::Impl::energyAt(const ClothState& state, double alpha,
                                          ClothState& place) const {
   place = state;
   system.advance(place, step, alpha);
-  if (!turning) return system.energy(place);
+  if (straight) return system.energy(place);
   const int nodes = system.sheet().nodeCount();
   const Points3 from = state.positions(nodes);
   Eigen::Map<Points3>(place.q.data(), 3, nodes) = path.moved(from, place.positions(nodes) - from);
   return system.energy(place);
-}
-
-/// A path that turns triangles instead of stretching them leads to lower energy where a sheet
-/// bends, a straight one where strain is to be taken out of it: that of the longer step that lowers
-/// it.
-void EquilibriumSolver::Impl::choosePath(const ClothState& state, double alpha, double energy) {
-  for (int k = 0; k < kMaxBacktracks; ++k, alpha *= 0.5) {
-    turning = true;
-    if (energyAt(state, alpha, trial) < energy) return;
-    turning = false;
-    if (energyAt(state, alpha, trial) < energy) return;
-  }
-  turning = true;
 }
 
 /// Multiplies alpha by `factor` as long as that lowers the energy `e` at `trial`.
@@ -226,6 +225,33 @@ void EquilibriumSolver::Impl::rescale(const ClothState& state, double factor, do
   }
 }
 
+/// Takes a Newton step although the energy may rise: a chain of links that hardly stretch moves
+/// along no path that lowers it at once. Returns false, back at the reference with its step, when
+/// kWatchdog such steps have not paid.
+bool EquilibriumSolver::Impl::tryFullStep(ClothState& state, double& energy) {
+  const double slope = g.dot(step);
+  if (reference.steps_since == 0 || energy <= reference.energy)
+    reference = {state, energy, g, step, 0};
+  const double alpha = fullStep(state);
+  const double before = residual(g);
+  const double e = energyAt(state, alpha, trial);
+  const bool falls = e <= energy + kArmijo * alpha * slope;
+  if (std::isfinite(e) && (falls || reference.steps_since < kWatchdog)) {
+    std::swap(state, trial);
+    energy = e;
+    system.gradient(state, g);
+    factors_near = residual(g) < kFactorsNear * before;
+    reference.steps_since = e < reference.energy ? 0 : reference.steps_since + 1;
+    return true;
+  }
+  state = reference.state;
+  energy = reference.energy;
+  g = reference.g;
+  step = reference.step;
+  reference.steps_since = 0;
+  return false;
+}
+
 /// A step with the factors of an earlier, near state; false, and nothing changed, if that does not
 /// serve any more.
 bool EquilibriumSolver::Impl::stepWithOldFactors(ClothState& state, double& energy) {
@@ -238,6 +264,7 @@ bool EquilibriumSolver::Impl::stepWithOldFactors(ClothState& state, double& ener
   std::swap(state, trial);
   std::swap(g, trial_g);
   energy = system.energy(state);
+  reference.steps_since = 0;
   return true;
 }
 
@@ -247,7 +274,6 @@ bool EquilibriumSolver::Impl::stepWithOldFactors(ClothState& state, double& ener
 bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
   const double slope = g.dot(step);
   double alpha = fullStep(state);
-  choosePath(state, alpha, energy);
   const double rounding = 1e-13 * std::max(std::abs(energy), std::abs(slope));
   const double before = residual(g);
   const auto agreement = [&](double e) {
@@ -268,6 +294,8 @@ bool EquilibriumSolver::Impl::lineSearch(ClothState& state, double& energy) {
     std::swap(state, trial);
     std::swap(g, trial_g);
     energy = e;
+    reference.steps_since = 0;
+    short_steps = alpha < 1.0 ? short_steps + 1 : 0;
     factors_near = used_share == 0.0 && alpha == 1.0 && residual(g) < kFactorsNear * before;
     if (k == 0 && agreed > kAsForeseen) share *= kEase;
     if (k > 0 || agreed < kInVain) share = std::min(1.0, kStiffen * share);
@@ -310,6 +338,7 @@ bool EquilibriumSolver::Impl::leaveSaddle(ClothState& state, double& energy,
   std::swap(state, other);
   energy = best;
   system.gradient(state, g);
+  reference.steps_since = 0;
   return true;
 }
 
@@ -320,6 +349,8 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
                                : kForceToleranceOfNodeWeight * system.lightestFreeNodeWeight_N();
   double energy = system.energy(state);
   system.gradient(state, g);
+  reference.steps_since = short_steps = 0;  // what an earlier solve left is of another state
+  straight = false;
   share = last_shift = 0.0;
   factors_near = false;
   int saddles = 0;
@@ -356,6 +387,8 @@ Termination EquilibriumSolver::Impl::iterate(ClothState& state, const Equilibriu
         newtonDirection(state, summary, false);
       }
     }
+    straight = straight || short_steps >= kCreeping || summary.newton_steps >= kPatience;
+    if (served && straight && tryFullStep(state, energy)) continue;
     if (lineSearch(state, energy)) continue;
     if (!served && share < 1.0) {
       share = 1.0;

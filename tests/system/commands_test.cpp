@@ -137,7 +137,7 @@ TEST(DrapeCommand, HangsASheetAndCertifiesIt) {
 
 TEST(DrapeCommand, MovesPinsAndHangsFromOne) {
   TemporaryFolder folder;
-  folder.write("sheet.obj", sheetObj(10, 10, 0.02));
+  folder.write("sheet.obj", sheetObj(25, 25, 0.04));
   const auto with = [&](const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {"drape",       "sheet.obj", "--rho",    "0.1",
                                           "--k-stretch", "3",         "--k-bend", "5e-3",
@@ -145,7 +145,7 @@ TEST(DrapeCommand, MovesPinsAndHangsFromOne) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return tenter(arguments, folder.path());
   };
-  const Outcome moved = with({"--fix", "0,9", "--move", "0:0.06,0,0", "--move", "9:-0.06,0,0"});
+  const Outcome moved = with({"--fix", "0,24", "--move", "0:0.12,0,0", "--move", "24:-0.12,0,0"});
   ASSERT_EQ(moved.exit_code, 0) << moved.err;
   EXPECT_LE(moved.json().at("residual_N").get<double>(), 1e-9);
   EXPECT_FALSE(moved.json().at("swivels").get<bool>());
