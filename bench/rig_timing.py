@@ -107,7 +107,9 @@ def jitter(options):
                                   str(socket.parent)], stdout=subprocess.PIPE, text=True)
         daemon = None
         try:
-            command = next(line for line in serve.stdout if "tenterd" in line)
+            command = next((line for line in serve.stdout if "tenterd" in line), None)
+            if command is None:
+                raise SystemExit("tenter twin serve ended before it served")
             daemon = subprocess.Popen(" ".join(["exec", *real_time, command.strip()]), shell=True,
                                       env={**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"},
                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

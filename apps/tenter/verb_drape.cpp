@@ -159,7 +159,7 @@ void tell(const Options& o, const EquilibriumSummary& s, bool converged, bool sw
                 "%s: residual %.3g N after %d Newton steps, smallest eigenvalue %.4g 1/s^2, %.2g s",
                 o.output.c_str(), s.residual_N, s.newton_steps, s.lambda_min_per_s2, s.seconds);
   console.say(text);
-  if (swivels)
+  if (swivels && converged)
     console.say("nothing stops it from turning about its pin; it is stable but for that");
 }
 

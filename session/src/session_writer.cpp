@@ -99,15 +99,14 @@ bool isWhole(const RepairReport& repair) {
   return repair.cut_bytes == 0 && !repair.newline_added && repair.stray_files.empty();
 }
 
-/// A session locked, looked through and repaired.
+/// A session locked and looked through.
 struct HeldSession {
   SessionHeader header;
   Descriptor lock;
   JournalSurvey survey;
-  RepairReport repair;
 };
 
-Result<HeldSession> holdSession(const fs::path& folder, std::chrono::system_clock::time_point now) {
+Result<HeldSession> holdSession(const fs::path& folder) {
   auto header = readSessionHeader(folder);
   if (!header) return header.error();
   auto lock = lockJournal(folder / format::kJournalFile);
@@ -115,9 +114,7 @@ Result<HeldSession> holdSession(const fs::path& folder, std::chrono::system_cloc
   auto survey = surveyJournal(folder, *header);
   if (!survey) return survey.error();
   if (auto done = checkIdentity(folder, *header, *survey); !done) return done.error();
-  auto repair = repairTornSession(folder, lock->get(), *survey, now);
-  if (!repair) return repair.error();
-  return HeldSession{std::move(*header), std::move(*lock), std::move(*survey), std::move(*repair)};
+  return HeldSession{std::move(*header), std::move(*lock), std::move(*survey)};
 }
 
 }  // namespace
@@ -146,11 +143,13 @@ Result<std::unique_ptr<SessionWriter>> SessionWriter::create(const fs::path& fol
 Result<ResumedSession> SessionWriter::open(const fs::path& folder,
                                            std::chrono::system_clock::time_point now,
                                            bool leave_if_whole) {
-  auto held = holdSession(folder, now);
+  auto held = holdSession(folder);
   if (!held) return held.error();
-  if (leave_if_whole && isWhole(held->repair)) return ResumedSession{nullptr, held->repair};
+  auto repair = repairTornSession(folder, held->lock.get(), held->survey, now);
+  if (!repair) return repair.error();
+  if (leave_if_whole && isWhole(*repair)) return ResumedSession{nullptr, *repair};
   auto state = std::make_unique<State>();
-  const std::uint64_t size = held->repair.offset_bytes + (held->repair.newline_added ? 1 : 0);
+  const std::uint64_t size = repair->offset_bytes + (repair->newline_added ? 1 : 0);
   state->folder = folder;
   state->journal = JournalFile::open(folder / format::kJournalFile, std::move(held->lock),
                                      static_cast<std::int64_t>(size), held->survey.next_sequence,
@@ -165,9 +164,9 @@ Result<ResumedSession> SessionWriter::open(const fs::path& folder,
     if (!begun) return begun.error();
   }
   const auto added = writer->append(resumeTime_ns(held->header, held->survey.last_time_ns, now),
-                                    resumedEvent(held->repair, now));
+                                    resumedEvent(*repair, now));
   if (!added) return added.error();
-  return ResumedSession{std::move(writer), std::move(held->repair)};
+  return ResumedSession{std::move(writer), std::move(*repair)};
 }
 
 Result<ResumedSession> SessionWriter::resume(const fs::path& folder,
@@ -176,24 +175,20 @@ Result<ResumedSession> SessionWriter::resume(const fs::path& folder,
 }
 
 Result<std::unique_ptr<SessionWriter>> SessionWriter::amend(const fs::path& folder) {
-  auto header = readSessionHeader(folder);
-  if (!header) return header.error();
+  auto held = holdSession(folder);
+  if (!held) return held.error();
   const fs::path file = folder / format::kJournalFile;
-  auto lock = lockJournal(file);
-  if (!lock) return lock.error();
-  auto survey = surveyJournal(folder, *header);
-  if (!survey) return survey.error();
-  if (auto done = checkIdentity(folder, *header, *survey); !done) return done.error();
-  if (survey->tail.cut_bytes > 0 || survey->lacks_line_end || survey->records == 0)
+  const JournalSurvey& survey = held->survey;
+  if (survey.tail.cut_bytes > 0 || survey.lacks_line_end || survey.records == 0)
     return badInput(file.string(), "", "ends in a torn record", "tenter session repair");
   auto state = std::make_unique<State>();
   state->folder = folder;
   state->journal = JournalFile::open(
-      file, std::move(*lock), static_cast<std::int64_t>(survey->tail.offset_bytes),
-      survey->next_sequence, std::chrono::nanoseconds(header->commit_interval_ns));
-  state->header = std::move(*header);
-  state->last_time_ns = survey->last_time_ns;
-  state->next_frame = frameAfter(survey->frames);
+      file, std::move(held->lock), static_cast<std::int64_t>(survey.tail.offset_bytes),
+      survey.next_sequence, std::chrono::nanoseconds(held->header.commit_interval_ns));
+  state->header = std::move(held->header);
+  state->last_time_ns = survey.last_time_ns;
+  state->next_frame = frameAfter(survey.frames);
   return std::unique_ptr<SessionWriter>(new SessionWriter(std::move(state)));
 }
 
