@@ -111,6 +111,9 @@ void CameraWorker::run() {
     if (camera_ && camera_->gone()) close(FrameFault::kNotConnected, "the connection was lost");
     if (!order) continue;
     SetFrame frame = camera_ ? take(order->wish()) : without(FrameFault::kNotConnected, "");
+    if (camera_ && silences_ > section_.retakes) {
+      close(FrameFault::kNotConnected, "confirms triggers and sends nothing; it is opened anew");
+    }
     {
       const std::lock_guard lock(mutex_);
       busy_ = false;
@@ -134,6 +137,7 @@ void CameraWorker::open() {
                                            identity.address + " instead of " + config_.serial);
   }
   judge_.forget();
+  silences_ = 0;
   warmUp();
   publish();
   const std::lock_guard lock(mutex_);
@@ -188,8 +192,9 @@ SetFrame CameraWorker::await(const FrameWish& wish, SetFrame frame) {
       saw_stale = true;
       continue;
     }
+    const bool nothing = outcome.fault == FrameFault::kNoFrame;
+    silences_ = nothing && wish.with_trigger && !saw_stale ? silences_ + 1 : 0;
     if (outcome.fault != FrameFault::kNone) {
-      const bool nothing = outcome.fault == FrameFault::kNoFrame;
       if (nothing) judge_.missed();
       frame.fault = nothing && saw_stale ? FrameFault::kStale : outcome.fault;
       frame.detail = outcome.detail;

@@ -64,6 +64,7 @@ class CameraWorker {
 
   std::unique_ptr<Camera> camera_;  ///< Of the thread, as the next ones.
   FrameJudge judge_;
+  int silences_ = 0;  ///< Triggers in a row that it confirmed and sent nothing for.
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

@@ -150,6 +150,15 @@ TEST_F(CameraBankTest, ACameraThatLeavesComesBack) {
   EXPECT_EQ(faultsOf(bank_->takeSet()), ";;;");
 }
 
+/// As a camera does that started anew without its driver's noticing.
+TEST_F(CameraBankTest, ACameraThatSendsNothingThroughAWholeSetIsOpenedAnew) {
+  start();
+  cameras_.set("b", [](CameraScript& script) { script.mute = true; });
+  EXPECT_EQ(faultsOf(bank_->takeSet()), ";no-frame;;");
+  ASSERT_TRUE(bank_->awaitAll(kStart));
+  EXPECT_EQ(faultsOf(bank_->takeSet()), ";;;");
+}
+
 TEST_F(CameraBankTest, ExchangedCamerasAreNamed) {
   cameras_.scripts["a"].swap(cameras_.scripts["b"]);
   bank_ = std::make_unique<CameraBank>(cameras_.section, cameras_.opener());

@@ -19,6 +19,7 @@ struct CameraScript {
   std::string serial = "S";
   bool answers = true;                 ///< Confirms triggers.
   bool there = true;                   ///< Can be opened.
+  bool mute = false;                   ///< No frames until it is opened anew.
   int swallowed = 0;                   ///< Triggers without a frame, from now on.
   int torn = 0;                        ///< Triggers whose frame is not whole.
   int delayed = 0;                     ///< Triggers whose frame comes with the next one's.
@@ -53,6 +54,7 @@ class ScriptedCamera : public Camera {
       script_->waiting.push_back(script_->late.front());
       script_->late.pop_front();
     }
+    if (script_->mute) return {};
     if (script_->swallowed > 0) {
       --script_->swallowed;
       return {};
@@ -140,6 +142,7 @@ struct ScriptedCameras {
                                const CameraSection&) -> Result<std::unique_ptr<Camera>> {
       const auto& script = scripts.at(config.name);
       const std::lock_guard lock(script->mutex);
+      script->mute = false;
       if (script->there) return std::unique_ptr<Camera>(std::make_unique<ScriptedCamera>(script));
       return Error{ErrorKind::kHardware, "", config.name, "cannot be opened", ""};
     };
