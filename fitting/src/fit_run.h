@@ -68,6 +68,7 @@ class FitRun {
                                 int least_residuals = 0) const;
   bool solve(const std::vector<int>& groups, const std::vector<int>& tests, int per_test,
              const OuterOptions& outer, const std::string& stage);
+  double scanScore(const std::vector<int>& tests, bool mixed) const;
   void scan(int group, const std::vector<int>& tests);
   void fitGroup(int group);
   void addKnots(int group, const std::vector<int>& tests, const OuterOptions& outer);

@@ -169,4 +169,11 @@ double FrameEvaluator::cost() const {
   return 0.5 * sum;
 }
 
+double FrameEvaluator::cost(int test) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < frames_.size(); ++i)
+    if (frames_[i].test == test) sum += blocks_[i].residuals.squaredNorm();
+  return 0.5 * sum;
+}
+
 }  // namespace tenter

@@ -58,6 +58,7 @@ class FrameEvaluator {
 
   const std::vector<FrameBlock>& blocks() const { return blocks_; }
   double cost() const;  ///< Half the sum of squares at the point evaluated last.
+  double cost(int test) const;
   bool cancelled() const { return cancelled_ && cancelled_(); }
   void ignoreCancelling() { cancelled_ = nullptr; }
   /// Of all tests (FitTest::requireProof).

@@ -15,7 +15,7 @@ constexpr double kNearEnough = 0.05;
 /// A warm start that takes longer than this is no better than a cold one.
 constexpr int kWarmIterations = 30;
 constexpr int kColdIterations = 300;
-constexpr int kRetryIterations = 50;
+constexpr int kRetryIterations = 200;
 /// Curves that differ by no more than this share of themselves at any knot lead from the same start
 /// to the same shape.
 constexpr double kSameCurves = 0.05;
