@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "rig_reader.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "subset_centres.h"
 #include "tenter/reconstruction/cord_finder.h"
@@ -21,6 +23,9 @@ constexpr double kWellOnTable_m = 3e-3;
 constexpr double kOnEdge_m = 0.05e-3;
 /// Fewer vertices do not tell where it lies.
 constexpr std::size_t kLeastOnTable = 20;
+/// Cloth on a table lies flat while heights scatter about a plane by less than this many of their
+/// standard deviations.
+constexpr double kFlat = 2.0;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 constexpr double kSigmaOfMedianDeviation = 1.4826;
 
@@ -39,6 +44,33 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Heights of cloth that lies flat on a level table: z = coefficients . (1, x, y). Nothing if it
+/// does not lie flat to within what its vertices' heights err by at rest, or if too few of them are
+/// seen.
+std::optional<Vec3> tablePlane(const RestSurface& rest, const std::vector<int>& lying) {
+  std::vector<int> seen;
+  Mat3 normal = Mat3::Zero();
+  Vec3 right = Vec3::Zero();
+  const auto terms = [&](int i) {
+    return Vec3(1.0, rest.mesh.positions(0, i), rest.mesh.positions(1, i));
+  };
+  for (const int i : lying) {
+    if (rest.vertices[i].state != PointState::kValid) continue;
+    seen.push_back(i);
+    normal.noalias() += terms(i) * terms(i).transpose();
+    right += rest.mesh.positions(2, i) * terms(i);
+  }
+  if (seen.size() < kLeastOnTable) return std::nullopt;
+  const Vec3 plane = normal.ldlt().solve(right);
+  std::vector<double> off;
+  for (const int i : seen) {
+    const double sigma = std::sqrt(rest.vertices[i].point.covariance_m2(2, 2));
+    off.push_back(std::abs(rest.mesh.positions(2, i) - plane.dot(terms(i))) / sigma);
+  }
+  const bool flat = kSigmaOfMedianDeviation * median(std::move(off)) < kFlat;
+  return flat ? std::optional<Vec3>(plane) : std::nullopt;
 }
 
 /// The part of a convex polygon with normal . x <= limit.
@@ -176,11 +208,15 @@ void RigReader::addTable(ClothFrame& cloth, Reading& reading) const {
   clip.rig_from_clip.translation() = push * table.push;
   for (int i = 0; i < rest_.mesh.vertexCount(); ++i) {
     const double along = table.push.dot(rest_.mesh.positions.col(i)) + push;
-    if (along > edge + kOnEdge_m) continue;
-    clip.clamped_vertices.push_back(i);
+    if (along <= edge + kOnEdge_m) clip.clamped_vertices.push_back(i);
+  }
+  const std::optional<Vec3> plane = tablePlane(rest_, clip.clamped_vertices);
+  for (const int i : clip.clamped_vertices) {
     // Seen or hidden, it lies on the table as it did, pushed with the rest. One that was not seen
     // at rest either stays what it is: filled.
-    const Vec3 at = rest_.mesh.positions.col(i) + push * table.push;
+    Vec3 at = rest_.mesh.positions.col(i);
+    if (plane) at.z() = plane->dot(Vec3(1.0, at.x(), at.y()));
+    at += push * table.push;
     cloth.positions_m.col(i) = at;
     if (rest_.vertices[i].state != PointState::kValid) continue;
     cloth.covariances_m2[i] =

@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "height_filter.h"
@@ -16,6 +17,15 @@ namespace {
 constexpr double kSpreads = 5.0, kSigmas = 5.0, kFixed_px = 0.15;
 constexpr std::size_t kLeastNeighbours = 3;
 constexpr int kLeastForQuadric = 12;
+/// Nodes each way in which a plane or quadric is looked for that leads to a node without a match,
+/// and how many of them say how it lies.
+constexpr std::array kPlaneReaches = {3, 5, 8, 12};
+constexpr int kLeastForPlane = 25;
+/// Below this all of them lie on one line.
+constexpr double kLeastPlaneRcond = 1e-4;
+/// A quadric leads there where what a plane leaves is more than this many times what it leaves: far
+/// from its nodes it errs more than a plane, unless they say that the surface is curved.
+constexpr double kCurved = 1.5;
 
 double medianOf(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -228,8 +238,48 @@ void SheetHeights::dropOutliers(std::vector<RestVertex>& vertices, double pixel_
   }
 }
 
-/// Grows the known nodes outwards, each new one where the planes of those around it lead.
+std::optional<double> SheetHeights::carriedTo(int node, int reach) const {
+  const std::vector<int> near = around(node, reach);
+  if (static_cast<int>(near.size()) < kLeastForPlane) return std::nullopt;
+  Mat6 normal = Mat6::Zero();
+  Vec6 right = Vec6::Zero();
+  double squares = 0.0;
+  for (const int other : near) {
+    const QuadricTerms at(other % grid_.columns - node % grid_.columns,
+                          other / grid_.columns - node / grid_.columns, reach);
+    const double height = heights_[other] - heights_[near.front()];
+    normal.noalias() += at.weight * at.terms * at.terms.transpose();
+    right += at.weight * height * at.terms;
+    squares += at.weight * height * height;
+  }
+  const Eigen::LDLT<Mat3> plane(normal.topLeftCorner<3, 3>());
+  if (plane.info() != Eigen::Success || plane.rcond() < kLeastPlaneRcond) return std::nullopt;
+  const Vec3 by_plane = plane.solve(right.head<3>());
+  const double off_plane = squares - right.head<3>().dot(by_plane);
+  const Eigen::LDLT<Mat6> quadric(normal);
+  const Vec6 by_quadric = quadric.solve(right);
+  const double off_quadric = squares - right.dot(by_quadric);
+  const bool curved = quadric.info() == Eigen::Success && quadric.rcond() > kLeastPlaneRcond &&
+                      by_quadric.allFinite() && off_plane > kCurved * off_quadric;
+  return heights_[near.front()] + (curved ? by_quadric[0] : by_plane[0]);
+}
+
+/// Nodes near known ones lie where a plane or a quadric through many of those leads: the slope
+/// between two of them, which err by micrometres, is off by tenths of a millimetre a few nodes
+/// away. From there the known nodes grow outwards, each new one where the planes of those around it
+/// lead.
 void SheetHeights::fill() {
+  const SheetHeights given = *this;
+  for (int node = 0; node < static_cast<int>(heights_.size()); ++node) {
+    if (given.known(node)) continue;
+    for (const int reach : kPlaneReaches) {
+      const auto height = given.carriedTo(node, reach);
+      if (!height) continue;
+      heights_[node] = *height;
+      known_[node] = 1;
+      break;
+    }
+  }
   for (bool grown = true; grown;) {
     const SheetHeights before = *this;
     grown = false;

@@ -49,6 +49,8 @@ class SheetHeights {
   void dropOutliers(std::vector<RestVertex>& vertices, double pixel_m);
   void fill();
   double quadricAt(int node, int reach) const;
+  /// Where a plane or a quadric through the known nodes around leads; nothing if they are too few.
+  std::optional<double> carriedTo(int node, int reach) const;
 
   const SheetGrid& grid_;
   std::vector<double> heights_;
