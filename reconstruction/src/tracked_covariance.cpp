@@ -69,7 +69,7 @@ Mat3 trackedCovariance(const std::vector<CameraView>& views, const RestSurface& 
   const double inflation2 = surface.inflation * surface.inflation;
   const Vec3 height_error = (now_from_rest - gradient) * rest.ray;
   double height_m2 = 0.0;
-  Mat3 with_height = Mat3::Zero();
+  Mat3 with_height = Mat3::Zero(), shared_errors = Mat3::Zero();
   for (std::size_t k = 0; k < by_rest.size(); ++k) {
     const Mat2& all = rest.sightings[k].sighting.covariance_px2;
     const Mat2 matched = all / inflation2;
@@ -78,14 +78,18 @@ Mat3 trackedCovariance(const std::vector<CameraView>& views, const RestSurface& 
     const Vec2 to_height = matched * height_by_pixel.transpose();
     height_m2 += height_by_pixel.dot(to_height);
     covariance += by_rest[k] * all * by_rest[k].transpose();
-    covariance -= twice(shared * followed[k] * matched * by_rest[k].transpose());
+    shared_errors += twice(shared * followed[k] * matched * by_rest[k].transpose());
     with_height += ((noise.with_match - 1.0) * by_rest[k] -
                     shared * (noise.with_tracking - 1.0) * followed[k]) *
                    to_height * height_error.transpose();
   }
   const double shape_m2 =
       (noise.own - 2.0 * noise.with_match + 1.0) * height_m2 + rest.shape_variance_m2;
-  return covariance + twice(with_height) + shape_m2 * height_error * height_error.transpose();
+  covariance += shape_m2 * height_error * height_error.transpose();
+  const Mat3 joint = covariance - shared_errors + twice(with_height);
+  // What errors have in common is estimated. Where it would outweigh them, on a slope that one view
+  // hardly sees, they are taken as independent.
+  return Eigen::LLT<Mat3>(joint).info() == Eigen::Success ? joint : covariance;
 }
 
 }  // namespace tenter
