@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "frame_judge.h"
+#include "tenter/core/median.h"
 
 #include <algorithm>
 #include <string_view>
@@ -15,12 +16,6 @@ template <class T>
 void remember(std::deque<T>& values, T value) {
   values.push_back(value);
   if (values.size() > kRemembered) values.pop_front();
-}
-
-double medianOf(std::deque<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::size_t hashOf(const CameraImage& image) {

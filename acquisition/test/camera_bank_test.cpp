@@ -150,7 +150,7 @@ TEST_F(CameraBankTest, ACameraThatLeavesComesBack) {
   EXPECT_EQ(faultsOf(bank_->takeSet()), ";;;");
 }
 
-/// As a camera does that started anew without its driver's noticing.
+/// As it happens where the driver loses a stream's packets (docs/traps.md).
 TEST_F(CameraBankTest, ACameraThatSendsNothingThroughAWholeSetIsOpenedAnew) {
   start();
   cameras_.set("b", [](CameraScript& script) { script.mute = true; });

@@ -6,6 +6,7 @@
 #include "import_specimen.h"
 #include "import_table.h"
 #include "tenter/fitting/import.h"
+#include "tenter/core/median.h"
 
 namespace tenter {
 
@@ -102,12 +103,6 @@ int branchesOf(const Eigen::VectorXd& displacement, std::vector<Branch>& branch)
   return turns;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// At most kFirstRows of the first rows, evenly chosen.
 std::vector<Eigen::Index> firstRows(Eigen::Index rows) {
   const auto share = static_cast<Eigen::Index>(kFirstRowsFraction * static_cast<double>(rows));
@@ -143,7 +138,7 @@ InitialLine initialLine(const Rows& rows) {
     }
   }
   if (slopes.empty()) return {};
-  return {median(std::move(slopes)), median(std::move(forces)), true};
+  return {medianOf(std::move(slopes)), medianOf(std::move(forces)), true};
 }
 
 Result<double> extrapolatedOffset(const NumberedTable& table, const Rows& rows, double length_m) {

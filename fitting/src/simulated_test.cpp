@@ -15,6 +15,7 @@ constexpr double kNearEnough = 0.05;
 /// A warm start that takes longer than this is no better than a cold one.
 constexpr int kWarmIterations = 30;
 constexpr int kColdIterations = 300;
+/// Cloth that snaps into another stable shape takes some hundred to settle there.
 constexpr int kRetryIterations = 200;
 /// Curves that differ by no more than this share of themselves at any knot lead from the same start
 /// to the same shape.
@@ -240,7 +241,7 @@ Eigen::MatrixXd SimulatedTest::solve(Simulation& simulation, int index, bool wit
     if (!outcome.converged) {
       const FrameOutcome warm = outcome;
       // A frame that had a state and loses it says that the point is bad: the outer loop steps back
-      // from it, so it is tried again once and not for hundreds of iterations from everywhere.
+      // from it, so it is tried again once and not from everywhere.
       const bool had_state = frame.accepted.generation >= 0;
       std::vector<ClothState> starts = coldStarts(simulation, index);
       if (had_state) starts.resize(1);

@@ -10,6 +10,7 @@
 #include "tenter/core/json_reader.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
+#include "tenter/inversion/material_directions.h"
 
 namespace tenter {
 namespace {
@@ -104,6 +105,15 @@ Result<void> readMeshes(const fs::path& folder, StoredInversion& out) {
   if (shape->mesh.vertexCount() != target->mesh.vertexCount() ||
       shape->mesh.triangles != target->mesh.triangles) {
     return badInput(rest.string(), "", "is another mesh than pose.vtp", "invert the target again");
+  }
+  if (const auto warp = target->data.cell.find("warp"); warp != target->data.cell.end()) {
+    const auto triangles = static_cast<Eigen::Index>(target->mesh.triangles.size());
+    if (warp->second.rows() != 3 || warp->second.cols() != triangles || !warp->second.allFinite())
+      return badInput(pose.string(), "warp", "is no direction for each triangle",
+                      "invert the target again");
+    auto frames = framesFromWarp(target->mesh, warp->second);
+    if (!frames) return frames.error().in(pose.string());
+    out.problem.frames = *std::move(frames);
   }
   out.problem.target = std::move(target->mesh);
   out.rest = std::move(shape->mesh.positions);

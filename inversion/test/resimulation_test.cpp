@@ -5,11 +5,13 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numbers>
 
 #include "shell_samples.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
+#include "tenter/inversion/material_directions.h"
 #include "tenter/inversion/resimulation_files.h"
 #include "tenter/test_support/data.h"
 #include "tenter/test_support/json_schema.h"
@@ -189,6 +191,25 @@ TEST_F(ResimulationTest, AMeshObstacleGoesWithTheFolder) {
   ASSERT_TRUE(summary.ok());
   EXPECT_LE(summary->max_displacement_rel, 1e-8);
   EXPECT_EQ(summary->stuck, 20);
+}
+
+/// Without material coordinates, or with others, directions are in the pose.
+TEST_F(ResimulationTest, DirectionsOfTheWarpGoWithTheFolder) {
+  test_support::TemporaryFolder copy;
+  std::filesystem::copy(*folder_ / "arch", copy / "arch");
+  const auto pose = copy / "arch/pose.vtp";
+  auto file = readMesh(pose).value();
+  const auto frames = framesAlong(file.mesh, {Vec3(1.0, 2.0, 0.0)}).value();
+  file.data.cell["warp"] = warpOf(file.mesh, frames);
+  ASSERT_TRUE(writeVtp(pose, file.mesh, file.data).ok());
+  const auto read = readInversion(copy / "arch");
+  ASSERT_TRUE(read.ok()) << read.error().message();
+  ASSERT_EQ(read->problem.frames.size(), frames.size());
+  for (std::size_t t = 0; t < frames.size(); ++t)
+    EXPECT_LE((read->problem.frames[t] - frames[t]).norm(), 1e-12 * frames[t].norm());
+  file.data.cell["warp"](0, 0) = std::numeric_limits<double>::quiet_NaN();
+  ASSERT_TRUE(writeVtp(pose, file.mesh, file.data).ok());
+  EXPECT_FALSE(readInversion(copy / "arch").ok());
 }
 
 TEST_F(ResimulationTest, FoldersThatDoNotFitTogetherAreRefused) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "height_field.h"
+#include "tenter/core/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,12 +13,6 @@ constexpr int kMaxCells = 2000;  ///< A side.
 /// A cell may depart from the median around it by so many cells' sides.
 constexpr double kSteepest = 2.0;
 constexpr std::size_t kLeastAround = 3, kClosing = 5;
-
-double medianOf(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "match_checks.h"
+#include "tenter/core/median.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,12 +18,6 @@ constexpr double kPile = 0.005;
 /// its standard deviation, and by a fixed part [px] for curvature of the field.
 constexpr double kSpreads = 2.0, kSigmas = 3.0, kFixed_px = 0.1;
 constexpr std::size_t kLeastNeighbours = 2;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The end of the scale seen from one side: `format_end`, or an extreme on which pixels pile up.
 float endOfScale(const std::vector<float>& pixels, float extreme, float format_end) {
@@ -160,9 +155,9 @@ bool agreesWithNeighbours(const CorrelatedPoint& point,
       predicted.push_back(warp.displacement()[axis] +
                           ((warp.linear() - Mat2::Identity()) * offset)[axis]);
     }
-    const double centre = median(predicted);
+    const double centre = medianOf(predicted);
     for (double& value : predicted) value = std::abs(value - centre);
-    const double allowed = kFixed_px + kSpreads * median(predicted) + kSigmas * point.sigma_px();
+    const double allowed = kFixed_px + kSpreads * medianOf(predicted) + kSigmas * point.sigma_px();
     if (std::abs(point.match.warp.displacement()[axis] - centre) > allowed) return false;
   }
   return true;

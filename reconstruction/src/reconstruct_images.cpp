@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tenter/reconstruction/reconstruct_images.h"
+#include "tenter/core/median.h"
 
 #include <algorithm>
 #include <chrono>
@@ -10,13 +11,6 @@ namespace tenter {
 namespace {
 
 template <class Value>
-double medianOf(std::vector<Value> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
-}
-
 double sigmaOf(const Mat3& covariance) { return std::sqrt(covariance.trace() / 3.0); }
 
 std::size_t imagesIn(const ImageSet& set) {

@@ -14,6 +14,7 @@
 #include "surface_warp.h"
 #include "view_matcher.h"
 #include "view_offsets.h"
+#include "tenter/core/median.h"
 
 namespace tenter {
 
@@ -41,13 +42,6 @@ constexpr double kBorder = 0.05;
 double shareOf(int freedom) {
   const double k = freedom;
   return k * std::pow(1.0 - 2.0 / (9.0 * k), 3.0);
-}
-
-double medianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// The place nearest to a node around which a subset sees nothing but cloth.

@@ -8,6 +8,7 @@
 
 #include "subset_centres.h"
 #include "tenter/reconstruction/cord_finder.h"
+#include "tenter/core/median.h"
 
 namespace tenter {
 
@@ -40,12 +41,6 @@ std::vector<MountedClip> taggedClips(const Mounting& mounting) {
 /// Drops what stands across the sample at rest, and across the table: both are level.
 Mat3 alongRest() { return Vec3(1.0, 1.0, 0.0).asDiagonal(); }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Heights of cloth that lies flat on a level table: z = coefficients . (1, x, y). Nothing if it
 /// does not lie flat to within what its vertices' heights err by at rest, or if too few of them are
 /// seen.
@@ -69,7 +64,7 @@ std::optional<Vec3> tablePlane(const RestSurface& rest, const std::vector<int>& 
     const double sigma = std::sqrt(rest.vertices[i].point.covariance_m2(2, 2));
     off.push_back(std::abs(rest.mesh.positions(2, i) - plane.dot(terms(i))) / sigma);
   }
-  const bool flat = kSigmaOfMedianDeviation * median(std::move(off)) < kFlat;
+  const bool flat = kSigmaOfMedianDeviation * medianOf(std::move(off)) < kFlat;
   return flat ? std::optional<Vec3>(plane) : std::nullopt;
 }
 
@@ -200,9 +195,9 @@ void RigReader::addTable(ClothFrame& cloth, Reading& reading) const {
     reading.warnings.push_back("the cloth on the table was not seen: the table is left out");
     return;
   }
-  const double push = median(moved);
+  const double push = medianOf(moved);
   for (double& value : moved) value = std::abs(value - push);
-  const double scatter = kSigmaOfMedianDeviation * median(std::move(moved));
+  const double scatter = kSigmaOfMedianDeviation * medianOf(std::move(moved));
   ClipReading clip;
   clip.clip = table.clip;
   clip.rig_from_clip.translation() = push * table.push;

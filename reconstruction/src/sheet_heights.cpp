@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "height_filter.h"
+#include "tenter/core/median.h"
 
 namespace tenter {
 
@@ -26,12 +27,6 @@ constexpr double kLeastPlaneRcond = 1e-4;
 /// A quadric leads there where what a plane leaves is more than this many times what it leaves: far
 /// from its nodes it errs more than a plane, unless they say that the surface is curved.
 constexpr double kCurved = 1.5;
-
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
@@ -160,11 +155,9 @@ void SheetHeights::refine(std::vector<RestVertex>& vertices, double pixel_m) {
   fill();
 }
 
-double SheetHeights::quadricAt(int node, int reach) const {
-  Mat6 normal = Mat6::Zero();
-  Vec6 right = Vec6::Zero();
+QuadricEquations SheetHeights::equationsAround(int node, int reach, double base) const {
+  QuadricEquations equations;
   const int column = node % grid_.columns, row = node / grid_.columns;
-  int count = 0;
   for (int j = -reach; j <= reach; ++j) {
     for (int i = -reach; i <= reach; ++i) {
       const int c = column + i, r = row + j;
@@ -172,14 +165,21 @@ double SheetHeights::quadricAt(int node, int reach) const {
       const int other = r * grid_.columns + c;
       if (!known(other)) continue;
       const QuadricTerms at(i, j, reach);
-      normal.noalias() += at.weight * at.terms * at.terms.transpose();
-      right += at.weight * heights_[other] * at.terms;
-      ++count;
+      const double height = heights_[other] - base;
+      equations.normal.noalias() += at.weight * at.terms * at.terms.transpose();
+      equations.right += at.weight * height * at.terms;
+      equations.squares += at.weight * height * height;
+      ++equations.count;
     }
   }
-  if (count < kLeastForQuadric) return heights_[node];
-  const Eigen::LDLT<Mat6> factors(normal);
-  const double height = factors.solve(right)[0];
+  return equations;
+}
+
+double SheetHeights::quadricAt(int node, int reach) const {
+  const QuadricEquations equations = equationsAround(node, reach, 0.0);
+  if (equations.count < kLeastForQuadric) return heights_[node];
+  const Eigen::LDLT<Mat6> factors(equations.normal);
+  const double height = factors.solve(equations.right)[0];
   return factors.info() == Eigen::Success && std::isfinite(height) ? height : heights_[node];
 }
 
@@ -241,17 +241,8 @@ void SheetHeights::dropOutliers(std::vector<RestVertex>& vertices, double pixel_
 std::optional<double> SheetHeights::carriedTo(int node, int reach) const {
   const std::vector<int> near = around(node, reach);
   if (static_cast<int>(near.size()) < kLeastForPlane) return std::nullopt;
-  Mat6 normal = Mat6::Zero();
-  Vec6 right = Vec6::Zero();
-  double squares = 0.0;
-  for (const int other : near) {
-    const QuadricTerms at(other % grid_.columns - node % grid_.columns,
-                          other / grid_.columns - node / grid_.columns, reach);
-    const double height = heights_[other] - heights_[near.front()];
-    normal.noalias() += at.weight * at.terms * at.terms.transpose();
-    right += at.weight * height * at.terms;
-    squares += at.weight * height * height;
-  }
+  const double base = heights_[near.front()];  // so that squares are of differences
+  const auto [normal, right, squares, count] = equationsAround(node, reach, base);
   const Eigen::LDLT<Mat3> plane(normal.topLeftCorner<3, 3>());
   if (plane.info() != Eigen::Success || plane.rcond() < kLeastPlaneRcond) return std::nullopt;
   const Vec3 by_plane = plane.solve(right.head<3>());
@@ -261,7 +252,7 @@ std::optional<double> SheetHeights::carriedTo(int node, int reach) const {
   const double off_quadric = squares - right.dot(by_quadric);
   const bool curved = quadric.info() == Eigen::Success && quadric.rcond() > kLeastPlaneRcond &&
                       by_quadric.allFinite() && off_plane > kCurved * off_quadric;
-  return heights_[near.front()] + (curved ? by_quadric[0] : by_plane[0]);
+  return base + (curved ? by_quadric[0] : by_plane[0]);
 }
 
 /// Nodes near known ones lie where a plane or a quadric through many of those leads: the slope

@@ -11,6 +11,14 @@ namespace tenter {
 
 struct SubsetWeights;
 
+/// Normal equations of a quadric through heights around a node: terms 1, x, y, x^2, x y, y^2.
+struct QuadricEquations {
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
+  double squares = 0.0;  ///< Weighted, of the heights.
+  int count = 0;
+};
+
 /// What each height counts in that of a quadric at the middle, all being known; 2 reach + 1 square.
 Eigen::MatrixXd quadricWeights(int reach);
 
@@ -48,6 +56,7 @@ class SheetHeights {
   Vec2 slope(int node) const;
   void dropOutliers(std::vector<RestVertex>& vertices, double pixel_m);
   void fill();
+  QuadricEquations equationsAround(int node, int reach, double base) const;
   double quadricAt(int node, int reach) const;
   /// Where a plane or a quadric through the known nodes around leads; nothing if they are too few.
   std::optional<double> carriedTo(int node, int reach) const;

@@ -14,6 +14,9 @@ namespace tenter {
 Result<std::vector<MaterialFrame>> framesAlong(const TriangleMesh& target,
                                                const std::vector<Vec3>& warp);
 
+/// The same with a direction for every triangle, 3 x triangles: what warpOf() gave.
+Result<std::vector<MaterialFrame>> framesFromWarp(const TriangleMesh& target, const Points3& warp);
+
 /// Warp of every triangle in the target pose, unit: 3 x triangles.
 Points3 warpOf(const TriangleMesh& target, const std::vector<MaterialFrame>& frames);
 
