@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "frame_judge.h"
-#include "tenter/core/median.h"
 
 #include <algorithm>
 #include <string_view>
+
+#include "tenter/core/median.h"
 
 namespace tenter {
 namespace {

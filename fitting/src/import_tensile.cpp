@@ -5,8 +5,8 @@
 
 #include "import_specimen.h"
 #include "import_table.h"
-#include "tenter/fitting/import.h"
 #include "tenter/core/median.h"
+#include "tenter/fitting/import.h"
 
 namespace tenter {
 

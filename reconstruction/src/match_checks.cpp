@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "match_checks.h"
-#include "tenter/core/median.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "tenter/core/median.h"
 
 namespace tenter {
 

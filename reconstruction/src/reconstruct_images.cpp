@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "tenter/reconstruction/reconstruct_images.h"
-#include "tenter/core/median.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 
+#include "tenter/core/median.h"
+
 namespace tenter {
 
 namespace {
 
-template <class Value>
 double sigmaOf(const Mat3& covariance) { return std::sqrt(covariance.trace() / 3.0); }
 
 std::size_t imagesIn(const ImageSet& set) {

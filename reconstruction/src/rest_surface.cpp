@@ -12,9 +12,9 @@
 #include "sheet_heights.h"
 #include "subset_centres.h"
 #include "surface_warp.h"
+#include "tenter/core/median.h"
 #include "view_matcher.h"
 #include "view_offsets.h"
-#include "tenter/core/median.h"
 
 namespace tenter {
 

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "subset_centres.h"
-#include "tenter/reconstruction/cord_finder.h"
 #include "tenter/core/median.h"
+#include "tenter/reconstruction/cord_finder.h"
 
 namespace tenter {
 
