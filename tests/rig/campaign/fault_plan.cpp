@@ -30,16 +30,17 @@ constexpr int kSwitch_ms = 150;
 constexpr int kFollowing_ms = 1600;
 constexpr int kForce_ms = 100;
 
-FaultKindRow cell(const std::string& name, Names names, bool once = false, bool rtu_only = false) {
-  return {name, Part::kCell, rtu_only, once, kCell_ms, std::move(names), kAll};
+FaultKindRow cell(const std::string& name, Names names, bool once = false,
+                  OnBus bus = OnBus::kBoth) {
+  return {name, Part::kCell, bus, once, kCell_ms, std::move(names), kAll};
 }
 
 FaultKindRow axis(const std::string& name, int bound_ms, Names names, Phases phases = kAll) {
-  return {name, Part::kAxis, false, false, bound_ms, std::move(names), std::move(phases)};
+  return {name, Part::kAxis, OnBus::kBoth, false, bound_ms, std::move(names), std::move(phases)};
 }
 
 FaultKindRow program(const std::string& name, int bound_ms, Names names, Phases phases) {
-  return {name, Part::kProgram, false, false, bound_ms, std::move(names), std::move(phases)};
+  return {name, Part::kProgram, OnBus::kBoth, false, bound_ms, std::move(names), std::move(phases)};
 }
 
 std::vector<FaultKindRow> makeKinds() {
@@ -49,16 +50,16 @@ std::vector<FaultKindRow> makeKinds() {
     const std::string name = std::string("exception-") + code;
     kinds.push_back(cell(name, {name}));
   }
-  kinds.push_back(cell("bad-crc", {"bad-crc"}, false, true));
+  kinds.push_back(cell("bad-crc", {"bad-crc"}, false, OnBus::kRtu));
   kinds.push_back(cell("half-frame", {"broken-answer"}));
   kinds.push_back(cell("dribble", {"broken-answer"}));
   kinds.push_back(cell("late-answer", {"late-answer", "silence"}, true));
-  kinds.push_back(cell("echo", {"echo"}, false, true));
+  kinds.push_back(cell("echo", {"echo"}, false, OnBus::kRtu));
   kinds.push_back(cell("wrong-unit", {"wrong-unit"}));
   kinds.push_back(cell("wrong-function", {"wrong-function"}));
   kinds.push_back(cell("wrong-count", {"wrong-count"}));
   kinds.push_back(cell("trailing-bytes", {"trailing-bytes", "late-answer"}));
-  kinds.push_back(cell("hang-up", {"disconnected"}));
+  kinds.push_back(cell("hang-up", {"disconnected"}, false, OnBus::kTcp));
   FaultKindRow stuck = cell("stuck", {"stuck"});
   stuck.bound_ms = kStuck_ms;
   kinds.push_back(stuck);
@@ -109,7 +110,7 @@ const std::vector<FaultKindRow>& faultKinds() {
 std::vector<Injection> makePlan(std::uint64_t seed, int count, int shard, int shards, bool tcp) {
   std::vector<Injection> pairs;
   for (const FaultKindRow& kind : faultKinds()) {
-    if (kind.rtu_only && tcp) continue;
+    if (kind.bus == (tcp ? OnBus::kRtu : OnBus::kTcp)) continue;
     for (const RigPhase phase : kind.phases) pairs.push_back({&kind, phase});
   }
   std::mt19937_64 random(seed);

@@ -13,11 +13,14 @@ namespace tenter::campaign {
 /// Who is befallen.
 enum class Part { kCell, kAxis, kProgram };
 
+/// Buses of load cells on which a fault exists: a serial line has nothing to hang up, TCP no CRC.
+enum class OnBus { kBoth, kTcp, kRtu };
+
 /// One kind of fault, and what has to follow from it.
 struct FaultKindRow {
   std::string name;  ///< As in fault scripts; of programs: as in programFault().
   Part part = Part::kCell;
-  bool rtu_only = false;
+  OnBus bus = OnBus::kBoth;
   bool once = false;            ///< Befalls one request or transfer: motion may go on.
   int bound_ms = 0;             ///< Until nothing loads any more, where `halts`.
   std::set<std::string> names;  ///< One of these is in log and session.
