@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "fit_output.h"
 #include "fit_residuals.h"
@@ -11,6 +15,16 @@
 
 namespace tenter {
 namespace {
+
+/// Of a fit that was stopped, bands and residuals each get no longer than this beyond the frames
+/// that are at work: on a fine replica all of them take the better part of an hour.
+constexpr std::chrono::seconds kStoppedFitFinishes{10};
+
+std::function<bool()> after(std::chrono::seconds patience) {
+  return [end = std::chrono::steady_clock::now() + patience] {
+    return std::chrono::steady_clock::now() >= end;
+  };
+}
 
 Result<const ClothModel*> modelFor(const FitOptions& options) {
   Result<const ClothModel*> model = findClothModel(options.model);
@@ -39,13 +53,21 @@ Result<void> checkTogether(const std::vector<Measurement>& measurements) {
 }
 
 /// The frames that a test is judged by: all; of a fit that was stopped only the few that brought
-/// the tests to its point, since others may take minutes with parameters that are half fitted.
+/// the tests to its point, and of these as many as there is time for.
 std::vector<FramePrediction> judgedFrames(const FrameEvaluator& evaluator, int test,
                                           bool cancelled) {
   if (!cancelled) return predictFrames(*evaluator.tests()[test], false, evaluator.threads());
-  std::vector<FramePrediction> frames;
+  std::vector<int> chosen;
   for (const FrameId& id : evaluator.frames())
-    if (id.test == test) frames.push_back(evaluator.tests()[test]->predict(id.frame, false));
+    if (id.test == test) chosen.push_back(id.frame);
+  std::vector<std::optional<FramePrediction>> predictions(chosen.size());
+  parallelFor(
+      static_cast<int>(chosen.size()), evaluator.threads(),
+      [&](int i) { predictions[i] = evaluator.tests()[test]->predict(chosen[i], false); },
+      [&] { return evaluator.cancelled(); });
+  std::vector<FramePrediction> frames;
+  for (std::optional<FramePrediction>& prediction : predictions)
+    if (prediction) frames.push_back(std::move(*prediction));
   return frames;
 }
 
@@ -53,6 +75,7 @@ std::vector<FramePrediction> judgedFrames(const FrameEvaluator& evaluator, int t
 void judgeTests(FitRun& run, const FitStatistics* statistics, FitResult& result) {
   const std::vector<FitTest*>& tests = run.evaluator().tests();
   const int threads = run.evaluator().threads();
+  if (result.cancelled) run.evaluator().cancelWhen(after(kStoppedFitFinishes));
   for (std::size_t t = 0; t < tests.size(); ++t) {
     TestResidual residual = summarizeTest(
         *tests[t], judgedFrames(run.evaluator(), static_cast<int>(t), result.cancelled));
@@ -98,6 +121,8 @@ void finish(FitRun& run, const std::vector<Measurement>& measurements, const Fit
   FitStatistics statistics;
   if (settled) statistics = fitStatistics(run.evaluator(), run.blocks(), z);
   const FitStatistics* known = settled ? &statistics : nullptr;
+  if (result.cancelled && !settled)
+    result.warnings.emplace_back("stopped before it was known how uncertain the curves are");
   result.material = materialOf(run, run.state(), space, known, z, measurements, options);
   judgeTests(run, known, result);
   result.material.fit = fitJson(run, result, known, z);
@@ -138,9 +163,10 @@ Result<FitResult> fitWithTests(const std::vector<Measurement>& measurements,
   FitResult result;
   const bool ran = run.run();
   // Cancelling is noticed between equilibria; from here on the answer is completed whatever
-  // happens.
+  // happens, of a fit that was stopped as far as that is soon done.
   result.cancelled = run.evaluator().cancelled();
-  run.evaluator().ignoreCancelling();
+  run.evaluator().cancelWhen(result.cancelled ? after(kStoppedFitFinishes)
+                                              : std::function<bool()>());
   if (result.cancelled && !run.last().usable)
     return notConverged("stopped before anything was fitted; nothing was written");
   if (!ran && !run.last().usable)

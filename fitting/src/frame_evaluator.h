@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fit_space.h"
@@ -60,7 +61,8 @@ class FrameEvaluator {
   double cost() const;  ///< Half the sum of squares at the point evaluated last.
   double cost(int test) const;
   bool cancelled() const { return cancelled_ && cancelled_(); }
-  void ignoreCancelling() { cancelled_ = nullptr; }
+  /// From here on another reason to stop; empty: none.
+  void cancelWhen(std::function<bool()> cancelled) { cancelled_ = std::move(cancelled); }
   /// Of all tests (FitTest::requireProof).
   void requireProof(bool required);
   const SolveCounts& counts() const { return counts_; }
