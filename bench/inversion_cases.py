@@ -3,15 +3,16 @@
 """Targets after the rows of table 1 of [Inv18], inverted one by one into a table of results.
 
     bench/inversion_cases.py build/release/bin/tenter OUT [--only skirt,page] [--time-budget 60] [--resimulate]
-                             [--range skirt,page] [--sweep skirt,page] [--reference skirt,page] [--reference-seconds 60]
+                             [--range skirt,page] [--sweep skirt,page] [--sweep-seconds 200] [--reference skirt,page] [--reference-seconds 60]
                              [--materials FITTED.json ...] [--growth] [--metric] [--table FILE.md]
 
 The shapes are generated: surfaces of revolution and their like in metres, resting on analytic bodies. Friction is that of the
 paper, and so is the material, times the first of 1, 2, 4, 8 that is certified. --resimulate lets what is certified move for
-5 s, --range looks for the softest multiple of some, --sweep inverts at 2 to 1/64 of the paper's stiffness, --reference runs the
+5 s, --range looks for the softest multiple of some, --sweep inverts at 2 to 1/64 of the paper's stiffness, for a rest mesh and for
+a metric rest state, each with at most --sweep-seconds, --reference runs the
 paper's algorithm on the same problem, --materials inverts three targets of fitted cloth, with their material turned by 90
-degrees too, --growth inverts one garment on ever finer meshes, --metric one of 10,000 vertices with 600 contacts, for the time
-that the convex stage takes. Answers that OUT holds already are used again. --table replaces what stands after the marker of a
+degrees too, --growth inverts one garment on ever finer meshes, --metric finds the metric rest state of one of 10,000 vertices with
+600 contacts. Answers that OUT holds already are used again. --table replaces what stands after the marker of a
 page.
 """
 import argparse
@@ -332,9 +333,9 @@ def run(program, name, options):
         answer["still"], answer["heavier"] = [
             kept(options.out / f"{name}-{g}.answer.json", lambda: resimulate(program, name, g, options)) for g in (1, 1.01)]
     if name in options.sweep.split(","):
-        answer["sweep"] = [kept(options.out / f"{name}-sweep-{k}.answer.json", lambda: invert(
-            program, target, options.out / f"{name}-sweep", bodies, mu, options.time_budget, constants(name, 2.0 ** -k)))
-                           for k in range(-1, 7)]
+        answer["sweep"] = {rest: [kept(options.out / f"{name}-sweep-{rest}-{k}.answer.json", lambda: invert(
+            program, target, options.out / f"{name}-sweep", bodies, mu, options.sweep_seconds, constants(name, 2.0 ** -k) + ["--rest", rest]))
+                                  for k in range(-1, 7)] for rest in ("mesh", "metric")}
     if name in options.range.split(","):
         answer["range"] = kept(options.out / f"{name}-range.answer.json", lambda: invert(
             program, target, options.out / f"{name}-range", bodies, mu, 4 * options.time_budget, constants(name, 1) + ["--range"]))["range"]
@@ -351,13 +352,13 @@ GROWTH = [(17, 12), (35, 25), (61, 41), (110, 90), (235, 170)]
 METRIC = (120, 83, 5)
 
 
-def grow(program, columns, rows, options, contact_rows=1):
+def grow(program, columns, rows, options, contact_rows=1, rest="mesh"):
     """The saroual of the cases on that mesh, each edge as stiff as there: what it costs, not what it is."""
     points, faces, bodies = barrel(columns, rows, 0.7, 0.11, 0.1, contact_rows, 0, 0.02)
     out = options.out / f"growth-{len(points)}-{contact_rows}"
     target = out.with_suffix(".obj")
     write_obj(target, points, faces)
-    answer = invert(program, target, out, bodies, CASES["saroual"][4], 10 * options.time_budget, constants("saroual", 1))
+    answer = invert(program, target, out, bodies, CASES["saroual"][4], 10 * options.time_budget, constants("saroual", 1) + ["--rest", rest])
     answer.update(name="saroual", factor=1, vertices=len(points), memory=resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)
     return answer
 
@@ -440,14 +441,23 @@ def growth_table(rows):
 
 
 def metric_table(rows):
-    return markdown(["Vertices", "Contacts", "Status", "Contact forces [s]", "Solved [s]"],
-                    [[r["vertices"], r["contacts"], r["status"], f"{r['forces_cpu_seconds']:.2f}", f"{r['solve_cpu_seconds']:.2f}"]
-                     for r in rows])
+    return markdown(["Vertices", "Contacts", "Status", "F / weight", "Smallest margin", "lambda_min [1/s^2]", "Re-draped, of size", "Solved [s]",
+                     "With its certificate, wall clock [s]"],
+                    [[r["vertices"], r["contacts"], r["status"], f"{r['force_residual_rel']:.1e}", f"{r['cone_margin_min']:.3f}",
+                      shown(r["lambda_min_per_s2"], ".3g"), shown(r["redrape_max_rel"], ".1e"), f"{r['solve_cpu_seconds']:.2f}",
+                      f"{r['seconds']:.2f}"] for r in rows])
+
+
+def swept(answer):
+    """Status, seconds, and of a proof the bound on lambda_min or that forces alone do it."""
+    proof = answer["proof"]
+    how = "" if not proof else ", forces" if proof["lambda_bound_per_s2"] is None else f", lambda <= {proof['lambda_bound_per_s2']:.2g}"
+    return f"{answer['status']}{how} ({answer['seconds']:.1f} s)"
 
 
 def sweep_table(rows):
-    return markdown(["Case"] + ["2", "1", "1/2", "1/4", "1/8", "1/16", "1/32", "1/64"],
-                    [[r["name"]] + [q["status"] for q in r["sweep"]] for r in rows])
+    return markdown(["Case", "Rest"] + ["2", "1", "1/2", "1/4", "1/8", "1/16", "1/32", "1/64"],
+                    [[r["name"], rest] + [swept(q) for q in r["sweep"][rest]] for r in rows for rest in ("mesh", "metric")])
 
 
 def range_table(rows):
@@ -479,6 +489,7 @@ def main():
     parser.add_argument("--resimulate", action="store_true")
     parser.add_argument("--range", default="")
     parser.add_argument("--sweep", default="")
+    parser.add_argument("--sweep-seconds", type=float, default=200.0)
     parser.add_argument("--growth", action="store_true")
     parser.add_argument("--metric", action="store_true")
     parser.add_argument("--reference", default="")
@@ -491,7 +502,7 @@ def main():
     for columns, count in GROWTH if options.growth else []:  # first, while no child has used more memory
         sizes.append(kept(options.out / f"growth-{columns * count}.answer.json", lambda: grow(options.program, columns, count, options)))
         print(growth_rows(sizes[-1:]).splitlines()[-1], flush=True)
-    metric = [kept(options.out / "metric.answer.json", lambda: grow(options.program, *METRIC[:2], options, METRIC[2]))] if options.metric else []
+    metric = [kept(options.out / "metric.answer.json", lambda: grow(options.program, *METRIC[:2], options, METRIC[2], "metric"))] if options.metric else []
     for name in filter(None, options.only.split(",")):
         rows.append(run(options.program, name, options))
         print(case_table(rows[-1:]).splitlines()[-1], flush=True)
@@ -504,7 +515,7 @@ def main():
              ([r for r in rows if "still" in r], "## Resimulated", resimulation_table),
              ([r for r in rows if "range" in r], "## Feasible range", range_table),
              (sizes, "## Growth", growth_table),
-             (metric, "## The convex stage alone", metric_table),
+             (metric, "## A metric rest state", metric_table),
              ([r for r in rows if "sweep" in r], "## Softer and softer", sweep_table),
              ([r for r in rows if "reference" in r], "## The algorithm of [Inv18] on the same problems", reference_table),
              (fabrics, "## Fitted cloth", fabric_table)]

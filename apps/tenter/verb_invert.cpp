@@ -27,7 +27,7 @@ constexpr double kLeastBudget_s = 1e-3;
 constexpr double kSolving = 0.95;
 
 struct Options {
-  std::string target, output, warp, method = "direct", gravity;
+  std::string target, output, warp, method = "direct", rest = "mesh", gravity;
   MeasuredTargetOptions measured;
   MaterialOptions material;
   std::vector<std::string> obstacles, fix;
@@ -77,6 +77,12 @@ void declare(CLI::App& command, Options& o) {
       .add_option("--method", o.method,
                   "direct, or reference: the algorithm of [Inv18], for comparison on small targets")
       ->check(CLI::IsMember({"direct", "reference"}))
+      ->capture_default_str();
+  command
+      .add_option("--rest", o.rest,
+                  "mesh: a shape that can be cut and sewn; metric: a rest length and angle for "
+                  "every edge, which need not fit together (--k-stretch and --k-bend only)")
+      ->check(CLI::IsMember({"mesh", "metric"}))
       ->capture_default_str();
   command.add_flag("--range", o.range,
                    "Find the multiples of stiffness and friction that have a certified rest shape");
@@ -167,6 +173,7 @@ nlohmann::json provenanceOf(const Options& o) {
           {"contact_distance_mm", o.contact_distance_mm},
           {"warp", o.warp},
           {"method", o.method},
+          {"rest", o.rest},
           {"time_budget_s", o.time_budget_s}};
 }
 
@@ -227,6 +234,8 @@ Result<int> finish(const Options& o, const InversionProblem& problem, const Inve
 Result<int> run(const Options& o, Console& console) {
   const auto start = std::chrono::steady_clock::now();
   if (auto free = checkOutputFolder(o.output, inversionFolder()); !free) return free.error();
+  if (o.rest == "metric" && o.method == "reference")
+    return usageError("--method reference finds rest meshes only", "leave --rest metric away");
   auto problem = problemOf(o, console);
   if (!problem) return problem.error();
   InversionOptions options;
@@ -236,6 +245,7 @@ Result<int> run(const Options& o, Console& console) {
     options.time_budget_s = std::max(kSolving * o.time_budget_s - read.count(), kLeastBudget_s);
   options.cancelled = interrupted;
   if (o.method == "reference") options.method = InversionMethod::kReference;
+  if (o.rest == "metric") options.rest = RestKind::kMetric;
   std::optional<Progress> progress(std::in_place, console);
   options.progress = [&progress](const std::string& stage) {
     spdlog::info("{}", stage);

@@ -199,7 +199,9 @@ void measureShape(const InverseShell& shell, const Points3& pose, const Points3&
     const auto [i, j] = edges[e].vertices;
     const auto at = static_cast<Eigen::Index>(e);
     const double length = (pose.col(j) - pose.col(i)).norm();
-    out.stretch[at] = ((rest.col(j) - rest.col(i)).norm() - length) / length;
+    const auto& metric = shell.elementRest();
+    const double rest_length = metric ? metric->length_m[at] : (rest.col(j) - rest.col(i)).norm();
+    out.stretch[at] = (rest_length - length) / length;
     if (edges[e].triangles[1] < 0) continue;
     Vec12 x, r;
     const std::array<int, 4> ids{i, j, edges[e].opposite[0], edges[e].opposite[1]};
@@ -207,8 +209,9 @@ void measureShape(const InverseShell& shell, const Points3& pose, const Points3&
       x.segment<3>(3 * k) = pose.col(ids[k]);
       r.segment<3>(3 * k) = rest.col(ids[k]);
     }
+    const double rest_angle = metric ? metric->angle_rad[at] : dihedralAngle(r);
     out.bend_rad[at] =
-        std::abs(std::remainder(dihedralAngle(r) - dihedralAngle(x), 2.0 * std::numbers::pi));
+        std::abs(std::remainder(rest_angle - dihedralAngle(x), 2.0 * std::numbers::pi));
   }
 }
 

@@ -75,6 +75,14 @@ ContactForces::Solution ContactForces::solve(const Eigen::VectorXd& gradient,
   Solution out;
   out.converged = r.converged;
   out.factorizations = r.factorizations;
+  out.motion = Eigen::VectorXd::Zero(gradient.size());
+  if (r.motion.size() == h_.size) {
+    for (std::size_t v = 0; v < first_dof_.size(); ++v)
+      if (first_dof_[v] >= 0)
+        out.motion.segment<3>(3 * static_cast<Eigen::Index>(v)) =
+            r.motion.segment<3>(first_dof_[v]);
+    out.motion.tail(gradient.size() - positions) = r.motion.tail(gradient.size() - positions);
+  }
   out.forces = std::move(r.forces);
   for (std::size_t i = 0; i < cones.size(); ++i)
     out.forces.col(static_cast<Eigen::Index>(i)) += offset_N * cones[i].normal;

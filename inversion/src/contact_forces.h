@@ -30,6 +30,9 @@ class ContactForces {
   struct Solution {
     bool converged = false;
     Points3 forces;  ///< 3 x contacts [N], on the shell.
+    /// Displacement whose strains the rest shape of least energy has the other way round: 3 a
+    /// vertex [m], then the rotations.
+    Eigen::VectorXd motion;
     int factorizations = 0;
   };
   /// @param gradient  dE/dq of the whole shell at the target, for the rest shape at hand.

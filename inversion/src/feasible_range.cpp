@@ -52,6 +52,7 @@ class Search {
     problem.material = scaled(problem_.material, stiffness);
     for (Contact& c : problem.contacts) c.friction *= friction;
     InversionOptions options = options_;
+    options.explain = false;
     if (options.time_budget_s > 0.0)
       options.time_budget_s = std::max(options.time_budget_s - seconds(), 1e-3);
     auto result = invert(problem, options);

@@ -32,6 +32,13 @@ Result<std::vector<MaterialFrame>> framesFromUv(const TriangleMesh& mesh) {
   return frames;
 }
 
+ClothTerms termsOf(const ClothLaws& laws, const SheetMesh& sheet, const ElementRest& rest) {
+  ClothTerms out;
+  out.terms.push_back(makeEdgeTerm(sheet, laws.membrane, rest));
+  if (laws.bending) out.terms.push_back(makeRawHingeTerm(sheet, laws.bending, rest));
+  return out;
+}
+
 /// Visits every element's gradient and, if wanted, its derivative: force(row, value) and
 /// block(row, column, value) in an order that depends on the mesh alone.
 template <class Force, class Block>
@@ -286,6 +293,16 @@ double InverseShell::weight_N(const Points3& rest) const {
   return mass(rest).sum() * material_.gravity_m_per_s2.norm();
 }
 
+bool hasElementRest(const ShellMaterial& material) {
+  return material.model->membrane == MembraneElement::kEdges &&
+         (!material.laws.bending || material.model->bending == BendingElement::kRawHinge);
+}
+
+void InverseShell::setElementRest(std::optional<ElementRest> rest) {
+  require(!rest || hasElementRest(material_), "InverseShell: no rest state of elements");
+  element_rest_ = std::move(rest);
+}
+
 SheetMesh InverseShell::sheet(const Points3& rest) const {
   SheetMesh sheet;
   sheet.rest = mesh_;
@@ -311,7 +328,9 @@ SheetMesh InverseShell::sheet(const Points3& rest) const {
 Result<ClothSystem> InverseShell::system(const Points3& rest, std::vector<int> held_vertices,
                                          std::vector<std::unique_ptr<EnergyTerm>> more) const {
   SheetMesh at_rest = sheet(rest);
-  auto terms = makeClothTerms(*material_.model, material_.laws, at_rest, {}, EdgeRotations::kAll);
+  auto terms = element_rest_ ? Result<ClothTerms>(termsOf(material_.laws, at_rest, *element_rest_))
+                             : makeClothTerms(*material_.model, material_.laws, at_rest, {},
+                                              EdgeRotations::kAll);
   if (!terms) return terms.error();
   for (auto& term : more) terms->terms.push_back(std::move(term));
   SystemSetup setup;

@@ -4,14 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <string>
 #include <utility>
 
 #include "contact_forces.h"
+#include "metric_stage.h"
 #include "reference_method.h"
 #include "rest_newton.h"
 #include "stabilize.h"
+#include "tenter/inversion/feasible_range.h"
 
 namespace tenter {
 namespace {
@@ -24,6 +28,8 @@ constexpr std::array kMargins{ConeMargin{0.9, 0.3}, ConeMargin{0.975, 0.02},
 /// Of the load's steps, when all of it at once is too much.
 constexpr double kLoadShrink = 0.25, kLoadGrowth = 1.5, kLeastLoadStep = 0.01;
 constexpr int kMaxChoices = 5;
+/// For the stiffness at which a metric rest state exists.
+constexpr double kStiffnessSearch_s = 20.0;
 /// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
 constexpr double kLambdaFloor_per_s2 = 0.05;
 
@@ -42,6 +48,7 @@ class Inverter {
       out_.proof = findSlidingProof(problem_.contacts, problem_.material.gravity_m_per_s2);
     if (out_.proof) return finish();
     if (options_.method == InversionMethod::kReference) return reference();
+    if (options_.rest == RestKind::kMetric) return metric();
     const std::clock_t before = std::clock();
     auto contact_forces = ContactForces::create(shell_, newton_);
     out_.forces_cpu_seconds += cpuSecondsSince(before);
@@ -119,6 +126,74 @@ class Inverter {
     return finish();
   }
 
+  Result<InversionResult> metric() {
+    auto found = metricRest(shell_, newton_, stopping());
+    if (!found) return found.error();
+    out_.softness_proof = std::move(found->proof);
+    out_.element_rest = std::move(found->rest);
+    if (out_.element_rest) load_ = 1.0;
+    shell_.setElementRest(out_.element_rest);
+    return finish();
+  }
+
+  std::function<bool()> stopping() const {
+    return [this] { return stopped(); };
+  }
+
+  Result<MetricResult> metricRest(InverseShell& shell, const RestNewton& newton,
+                                  const std::function<bool()>& stop) {
+    MetricOptions o;
+    o.lambda_floor_per_s2 = kLambdaFloor_per_s2;
+    o.stop = stop;
+    o.progress = [this](const char* stage, double lambda) {
+      say((std::string("metric rest state: ") + stage + ", lambda_min %.4g").c_str(), lambda);
+    };
+    auto found = findMetricRest(shell, newton, o);
+    if (found) out_.factorizations += found->factorizations;
+    return found;
+  }
+
+  /// No rest shape was found: perhaps not even a metric rest state exists.
+  void explainFailure() {
+    if (!options_.explain || !hasElementRest(shell_.material())) return;
+    if (options_.rest == RestKind::kMesh) {
+      const auto found = metricRest(shell_, newton_, stopping());
+      if (!found) return;
+      out_.softness_proof = found->proof;
+      if (found->rest) out_.metric_lambda_min_per_s2 = found->lambda_min_per_s2;
+    }
+    if (out_.softness_proof) searchStiffness();
+  }
+
+  /// Between the stiffness that is proved too small and one that is found to do: doubled, then
+  /// halved in the logarithm.
+  void searchStiffness() {
+    double& low = out_.stiffness_factor_proved_below;
+    std::optional<double>& high = out_.stiffness_factor_min;
+    const std::function<bool()> stop = [this, end = seconds() + kStiffnessSearch_s] {
+      return stopped() || seconds() > end;
+    };
+    for (double factor = 2.0; !high && factor <= kStiffestFactor; factor *= 2.0)
+      if (!narrow(factor, stop)) return;
+    while (high && *high / low > kRangeRatio)
+      if (!narrow(std::sqrt(low * *high), stop)) return;
+  }
+
+  /// False where neither a state nor a proof is found.
+  bool narrow(double factor, const std::function<bool()>& stop) {
+    auto shell =
+        InverseShell::create(problem_.target, scaled(problem_.material, factor), problem_.frames);
+    if (!shell) return false;
+    const RestNewton newton(*shell, problem_.target.positions, problem_.fixed, problem_.contacts);
+    const auto found = metricRest(*shell, newton, stop);
+    if (!found || (!found->rest && !found->proof)) return false;
+    if (found->rest)
+      out_.stiffness_factor_min = factor;
+    else
+      out_.stiffness_factor_proved_below = factor;
+    return true;
+  }
+
   RestNewtonOptions newtonOptions() const {
     RestNewtonOptions o;
     o.stop = [this] { return stopped(); };
@@ -158,7 +233,7 @@ class Inverter {
     out_.load_balanced = load_;
     out_.rest = unknowns_.rest;
     out_.rotations = unknowns_.rotations;
-    out_.contact_forces = newton_.contactForces(newton_.gradient(unknowns_, 1.0));
+    out_.contact_forces = newton_.contactForces(gradient());
     out_.solve_cpu_seconds = cpuSecondsSince(start_cpu_);
     say("solved after %.3g s", seconds());
     CertificateOptions c;
@@ -168,12 +243,21 @@ class Inverter {
                                problem_.fixed, problem_.contacts, c);
     if (!certificate) return certificate.error();
     out_.certificate = std::move(certificate).value();
+    const bool certified = out_.certificate.holds();
+    if (!certified && !out_.proof && !stopped()) explainFailure();
     out_.seconds = seconds();
-    if (out_.certificate.holds()) {
+    if (certified) {
       out_.status = InversionStatus::kCertified;
     } else if (out_.proof) {
       out_.status = InversionStatus::kInfeasible;
       out_.reason = "the shell slides off as a whole, whatever its rest shape";
+    } else if (out_.softness_proof) {
+      out_.status = InversionStatus::kInfeasible;
+      out_.reason =
+          out_.softness_proof->modes.empty()
+              ? "no rest lengths and angles balance the weight without stretching an edge "
+                "to more than double: the material is too soft"
+              : "no rest lengths and angles are stable: the material is too soft";
     } else if (stopped()) {
       out_.status = InversionStatus::kBudget;
       out_.reason = options_.cancelled && options_.cancelled() ? "stopped" : "time ran out";
@@ -182,8 +266,20 @@ class Inverter {
           !out_.certificate.balanced() ? "no rest shape was found that balances the forces"
           : !out_.certificate.stable() ? "the equilibrium that was found is not stable"
                                        : "a perturbed shell does not return to the target";
+      if (out_.metric_lambda_min_per_s2)
+        out_.reason += "; rest lengths and angles that fit no mesh would hold it (--rest metric)";
     }
     return out_;
+  }
+
+  /// dE/dq at the target [N].
+  Eigen::VectorXd gradient() const {
+    if (!out_.element_rest) return newton_.gradient(unknowns_, 1.0);
+    const auto system = shell_.system(unknowns_.rest, problem_.fixed);
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(shell_.coordinateCount());
+    const Eigen::VectorXd q = shell_.coordinates(problem_.target.positions, unknowns_.rotations);
+    for (const auto& term : system.value().terms()) term->addGradient(q, sum);
+    return sum;
   }
 
   const InversionProblem& problem_;

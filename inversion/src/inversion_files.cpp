@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "metric_file.h"
 #include "tenter/core/files.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/material_directions.h"
@@ -22,6 +23,20 @@ nlohmann::json numberOrNull(bool known, double value) {
 }
 
 nlohmann::json proofJson(const InversionResult& result) {
+  if (result.softness_proof) {
+    const SoftnessProof& p = *result.softness_proof;
+    const bool by_modes = !p.modes.empty();
+    return {{"kind", "softness"},
+            {"modes", p.modes.size()},
+            {"lambda_bound_per_s2", numberOrNull(by_modes, p.bound)},
+            {"work_bound_J", numberOrNull(!by_modes, p.bound)},
+            {"stretch_limit", kStretchLimit},
+            {"weight_change", p.weight_change},
+            {"stiffness_factor_proved_below", result.stiffness_factor_proved_below},
+            {"stiffness_factor_min", result.stiffness_factor_min
+                                         ? nlohmann::json(*result.stiffness_factor_min)
+                                         : nlohmann::json()}};
+  }
   if (!result.proof) return nullptr;
   const SlidingProof& p = *result.proof;
   return {{"kind", "sliding"},
@@ -74,6 +89,17 @@ Eigen::MatrixXd vertexMeans(const MeshTopology& topology, const Eigen::VectorXd&
   return mean.cwiseQuotient(count.cwiseMax(1.0));
 }
 
+constexpr const char* kProofFile = "proof.vtp";
+
+Result<void> writeProof(const std::filesystem::path& file, const TriangleMesh& target,
+                        const SoftnessProof& proof) {
+  MeshData data;
+  data.point["motion"] = proof.motion;
+  for (std::size_t k = 0; k < proof.modes.size(); ++k)
+    data.point["mode_" + std::to_string(k)] = proof.modes[k];
+  return writeVtp(file, target, data);
+}
+
 Result<void> writeMeshes(const std::filesystem::path& folder, const InversionProblem& problem,
                          const InversionResult& result) {
   const auto topology = buildTopology(problem.target);
@@ -117,6 +143,14 @@ Result<void> writeMeshes(const std::filesystem::path& folder, const InversionPro
                                   {"holds", holds}});
       !done)
     return done;
+  if (result.element_rest) {
+    if (auto done = writeElementRest(folder / kMetricFile, *topology, *result.element_rest); !done)
+      return done;
+  }
+  if (result.softness_proof) {
+    if (auto done = writeProof(folder / kProofFile, problem.target, *result.softness_proof); !done)
+      return done;
+  }
   std::vector<std::array<int, 2>> lines;
   for (const MeshEdge& e : topology->edges) lines.push_back(e.vertices);
   return writeVtpLines(folder / "strains.vtp", problem.target.positions, lines,
@@ -134,6 +168,7 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
       {"schema_version", kInversionSchemaVersion},
       {"status", name(result.status)},
       {"reason", result.reason},
+      {"rest", result.element_rest ? "metric" : "mesh"},
       {"vertices", problem.target.vertexCount()},
       {"size_m", c.size_m},
       {"weight_N", c.weight_N},
@@ -191,10 +226,10 @@ nlohmann::json rangeToJson(const FeasibleRange& range) {
 }
 
 const FolderKind& inversionFolder() {
-  static const FolderKind kKind{
-      "certificate.json",
-      "\"bend_max_rad\"",
-      {"rest.obj", "pose.vtp", "contacts.vtp", "strains.vtp", kProblemFile}};
+  static const FolderKind kKind{"certificate.json",
+                                "\"bend_max_rad\"",
+                                {"rest.obj", "pose.vtp", "contacts.vtp", "strains.vtp", kMetricFile,
+                                 kProofFile, kProblemFile}};
   return kKind;
 }
 

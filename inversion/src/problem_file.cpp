@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analytic_obstacles.h"
+#include "metric_file.h"
 #include "tenter/core/json_reader.h"
 #include "tenter/core/mesh_io.h"
 #include "tenter/inversion/inversion_files.h"
@@ -115,6 +116,12 @@ Result<void> readMeshes(const fs::path& folder, StoredInversion& out) {
     if (!frames) return frames.error().in(pose.string());
     out.problem.frames = *std::move(frames);
   }
+  std::error_code error;
+  if (fs::exists(folder / kMetricFile, error)) {
+    auto metric = readElementRest(folder / kMetricFile, buildTopology(target->mesh).value());
+    if (!metric) return metric.error();
+    out.element_rest = *std::move(metric);
+  }
   out.problem.target = std::move(target->mesh);
   out.rest = std::move(shape->mesh.positions);
   return {};
@@ -154,6 +161,9 @@ Result<void> readProblem(const fs::path& file, StoredInversion& out) {
   if (!laws) return laws.error().in(name);
   out.problem.material = {*model, std::move(laws).value(), material->areal_density_kg_per_m2,
                           gravity};
+  if (out.element_rest && !hasElementRest(out.problem.material))
+    return badInput(name, "material.law",
+                    "has no rest lengths and angles as metric.json gives them");
   return {};
 }
 

@@ -99,6 +99,7 @@ class Run {
     const Vec3 gravity = problem.material.gravity_m_per_s2;
     out_.size_m = sizeOf(start.pose);
     out_.weight_N = shell->weight_N(start.rest);
+    if (!options_.rest_is_target) shell->setElementRest(inversion.element_rest);
     shell->setGravity(options_.gravity_scale * gravity);
     auto dynamics = ShellDynamics::create(*shell, start, obstaclesOf(inversion), dynamicsOptions());
     if (!dynamics) return dynamics.error();

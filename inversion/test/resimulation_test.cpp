@@ -55,6 +55,9 @@ class ResimulationTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new test_support::TemporaryFolder;
+    store("arch", RestKind::kMesh);
+  }
+  static void store(const char* name, RestKind rest) {
     const ProblemFile file{twoConstants(2.0), kDefaultGravity, 0.4, {}, {"plane:0,0,0,0,0,1"}};
     InversionProblem problem;
     problem.target = arch(10);
@@ -64,10 +67,12 @@ class ResimulationTest : public testing::Test {
     std::vector<std::unique_ptr<Obstacle>> floor;
     floor.push_back(makeObstacle(file.obstacles[0]).value());
     problem.contacts = findContacts(problem.target, floor, {}, {0.4, 1e-4}).value();
-    const auto result = invert(problem, {}).value();
+    InversionOptions options;
+    options.rest = rest;
+    const auto result = invert(problem, options).value();
     ASSERT_EQ(result.status, InversionStatus::kCertified);
     ASSERT_TRUE(
-        writeInversion(*folder_ / "arch", problem, result, {}, problemToJson(file).value()).ok());
+        writeInversion(*folder_ / name, problem, result, {}, problemToJson(file).value()).ok());
   }
   static void TearDownTestSuite() { delete folder_; }
 
@@ -108,6 +113,43 @@ TEST_F(ResimulationTest, InvertedItStandsStill) {
   EXPECT_EQ(s.stuck, 20);
   EXPECT_EQ(s.sliding + s.off + s.landed, 0);
   EXPECT_EQ(s.frames, 126);
+}
+
+TEST_F(ResimulationTest, AMetricRestStateStandsStillToo) {
+  store("metric", RestKind::kMetric);
+  const auto json = nlohmann::json::parse(test_support::slurp(*folder_ / "metric/metric.json"));
+  EXPECT_EQ(test_support::schemaErrors(
+                json, test_support::sourceFolder() / "docs/formats/metric.schema.json"),
+            std::vector<std::string>{});
+  const auto stands = [](bool as_target) {
+    ResimulationOptions options;
+    options.seconds = 0.5;
+    options.rest_is_target = as_target;
+    const auto none = [](const ResimulationFrame&) -> Result<void> { return {}; };
+    return resimulate(readInversion(*folder_ / "metric").value(), options, none)
+        .value()
+        .max_displacement_rel;
+  };
+  EXPECT_LE(stands(false), 1e-8);
+  EXPECT_GT(stands(true), 1e-3) << "rest.obj is the target, which sags";
+}
+
+TEST_F(ResimulationTest, OtherMetricsAreRefusedByPlace) {
+  store("spoiled", RestKind::kMetric);
+  const auto file = *folder_ / "spoiled/metric.json";
+  const auto good = nlohmann::json::parse(test_support::slurp(file));
+  const auto refusal = [&](const char* key, const nlohmann::json& value) {
+    nlohmann::json spoiled = good;
+    spoiled[key][3] = value;
+    folder_->write("spoiled/metric.json", spoiled.dump());
+    const auto read = readInversion(*folder_ / "spoiled");
+    EXPECT_FALSE(read.ok());
+    return read.ok() ? std::string() : read.error().message();
+  };
+  EXPECT_NE(refusal("edges", {0, 55}).find("edges[3]"), std::string::npos);
+  EXPECT_NE(refusal("rest_length_m", 0.0).find("rest_length_m[3]"), std::string::npos);
+  EXPECT_NE(refusal("rest_length_m", "x").find("rest_length_m"), std::string::npos);
+  EXPECT_NE(refusal("rest_angle_rad", 4.0).find("rest_angle_rad[3]"), std::string::npos);
 }
 
 TEST_F(ResimulationTest, WithMoreGravityItMovesAsLinearlyPredicted) {

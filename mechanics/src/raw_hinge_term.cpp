@@ -5,7 +5,7 @@
 #include "angle_difference.h"
 #include "parameter_scratch.h"
 #include "tenter/mechanics/dihedral_angle.h"
-#include "tenter/mechanics/energy_terms.h"
+#include "tenter/mechanics/element_rest.h"
 
 namespace tenter {
 namespace {
@@ -19,11 +19,14 @@ struct Element {
 
 class RawHingeTerm final : public EnergyTerm {
  public:
-  RawHingeTerm(const SheetMesh& sheet, std::shared_ptr<const StrainLaw> law)
+  /// @param element_rest  gives the rest angles unless null.
+  RawHingeTerm(const SheetMesh& sheet, std::shared_ptr<const StrainLaw> law,
+               const ElementRest* element_rest)
       : law_(std::move(law)) {
     const Eigen::VectorXd rest =
         Eigen::Map<const Eigen::VectorXd>(sheet.rest.positions.data(), 3 * sheet.nodeCount());
-    for (const MeshEdge& edge : sheet.topology.edges) {
+    for (std::size_t k = 0; k < sheet.topology.edges.size(); ++k) {
+      const MeshEdge& edge = sheet.topology.edges[k];
       if (edge.triangles[1] < 0) continue;
       Element e{{edge.vertices[0], edge.vertices[1], edge.opposite[0], edge.opposite[1]}, 0, 0, 0};
       const double length2 =
@@ -31,7 +34,8 @@ class RawHingeTerm final : public EnergyTerm {
       e.area =
           sheet.triangles[edge.triangles[0]].area_m2 + sheet.triangles[edge.triangles[1]].area_m2;
       e.weight = 3.0 * length2 / e.area;
-      e.rest_angle = dihedralAngle(positions(e, rest));
+      e.rest_angle = element_rest ? element_rest->angle_rad[static_cast<Eigen::Index>(k)]
+                                  : dihedralAngle(positions(e, rest));
       elements_.push_back(e);
       Stencil s;
       s.node_count = 4;
@@ -135,7 +139,16 @@ class RawHingeTerm final : public EnergyTerm {
 std::unique_ptr<EnergyTerm> makeRawHingeTerm(const SheetMesh& sheet,
                                              std::shared_ptr<const StrainLaw> law) {
   require(law != nullptr, "makeRawHingeTerm: no law");
-  return std::make_unique<RawHingeTerm>(sheet, std::move(law));
+  return std::make_unique<RawHingeTerm>(sheet, std::move(law), nullptr);
+}
+
+std::unique_ptr<EnergyTerm> makeRawHingeTerm(const SheetMesh& sheet,
+                                             std::shared_ptr<const StrainLaw> law,
+                                             const ElementRest& rest) {
+  require(law != nullptr, "makeRawHingeTerm: no law");
+  require(rest.angle_rad.size() == static_cast<Eigen::Index>(sheet.topology.edges.size()),
+          "makeRawHingeTerm: one rest angle an edge");
+  return std::make_unique<RawHingeTerm>(sheet, std::move(law), &rest);
 }
 
 }  // namespace tenter

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <sstream>
 
 #include "program.h"
@@ -157,6 +158,41 @@ TEST(InvertCommand, RangeIsInTheAnswerAndTheFile) {
   EXPECT_LE(range.at("friction_factor_min").get<double>(), 1.0);
   EXPECT_EQ(nlohmann::json::parse(test_support::slurp(folder / "DIR/certificate.json")).at("range"),
             range);
+}
+
+TEST(InvertCommand, AMetricRestStateIsWrittenAndMovesAsIfAtRest) {
+  TemporaryFolder folder;
+  folder.write("TARGET.obj", drapedCap(0.02));
+  const auto inverted = [&](const char* stretch, const char* bend, const char* out) {
+    return tenter({"invert", "TARGET.obj", "--rho", "0.1", "--k-stretch", stretch, "--k-bend", bend,
+                   "--obstacle", "sphere:0,0,0,0.1", "--friction", "0.4", "--rest", "metric", "-o",
+                   out, "--json"},
+                  folder.path());
+  };
+  const Outcome outcome = inverted("30", "1e-3", "DIR");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err << outcome.out;
+  EXPECT_TRUE(std::filesystem::exists(folder / "DIR/metric.json"));
+  const Outcome moved =
+      tenter({"resimulate", "DIR", "--seconds", "0.2", "-o", "OUT.pvd", "--json"}, folder.path());
+  ASSERT_EQ(moved.exit_code, 0) << moved.err;
+  EXPECT_LE(moved.json().at("max_displacement_rel").get<double>(), 1e-8);
+  const Outcome soft = inverted("1e-4", "1e-8", "SOFT");
+  EXPECT_EQ(soft.exit_code, 5) << soft.err;
+  EXPECT_EQ(soft.json().at("status"), "infeasible");
+  EXPECT_EQ(soft.json().at("proof").at("kind"), "softness");
+  EXPECT_TRUE(std::filesystem::exists(folder / "SOFT/proof.vtp"));
+}
+
+TEST(InvertCommand, AMetricRestStateOfAFabricIsRefused) {
+  TemporaryFolder folder;
+  folder.write("TARGET.obj", drapedCap(0.02));
+  folder.write("fitted.json", satin());
+  const Outcome outcome = tenter({"invert", "TARGET.obj", "--material", "fitted.json", "--obstacle",
+                                  "sphere:0,0,0,0.1", "--rest", "metric", "-o", "DIR"},
+                                 folder.path());
+  EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("--k-stretch"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "DIR"));
 }
 
 TEST(InvertCommand, TheTimeBudgetHolds) {

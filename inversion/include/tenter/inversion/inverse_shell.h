@@ -3,9 +3,11 @@
 
 #include <Eigen/Sparse>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "tenter/mechanics/cloth_system.h"
+#include "tenter/mechanics/element_rest.h"
 
 namespace tenter {
 
@@ -16,6 +18,10 @@ struct ShellMaterial {
   double areal_density_kg_per_m2 = 0.0;
   Vec3 gravity_m_per_s2 = kDefaultGravity;
 };
+
+/// Whether its elements are edges and raw hinges: the only ones whose rest state can be given one
+/// by one.
+bool hasElementRest(const ShellMaterial& material);
 
 /// Edge vectors of a triangle in its weft and warp axes, one column an edge (1 - 0, 2 - 0).
 using MaterialFrame = Mat2;
@@ -56,6 +62,11 @@ class InverseShell {
   Eigen::VectorXd mass(const Points3& rest) const;  ///< Of each vertex [kg].
   double weight_N(const Points3& rest) const;       ///< Total mass times |gravity|.
 
+  /// From here on system() has these rest lengths and angles, its rest positions giving masses and
+  /// the hinges' weights only; nothing: those of the rest positions again. Needs hasElementRest().
+  void setElementRest(std::optional<ElementRest> rest);
+  const std::optional<ElementRest>& elementRest() const { return element_rest_; }
+
   SheetMesh sheet(const Points3& rest) const;
   /// The forward problem on that rest shape, with more energies if given. Error as
   /// ClothSystem::create.
@@ -70,6 +81,7 @@ class InverseShell {
   MeshTopology topology_;
   ShellMaterial material_;
   std::vector<MaterialFrame> frames_;  ///< Empty: directions do not matter.
+  std::optional<ElementRest> element_rest_;
   int rotation_count_ = 0;
   /// Of gradientByRest: the matrix, and where each entry goes in the order elements give them.
   mutable Sparse by_rest_;

@@ -8,6 +8,7 @@
 
 #include "tenter/inversion/certificate.h"
 #include "tenter/inversion/sliding_proof.h"
+#include "tenter/inversion/softness_proof.h"
 
 namespace tenter {
 
@@ -34,22 +35,39 @@ enum class InversionMethod {
   kReference,  ///< The algorithm of [Inv18], for comparison: thousands of drapes, small cases only.
 };
 
+/// What is looked for.
+enum class RestKind {
+  kMesh,    ///< Rest positions: a shape that can be cut and sewn.
+  kMetric,  ///< A rest length and a rest angle for every edge, which need not fit together.
+};
+
 struct InversionOptions {
   InversionMethod method = InversionMethod::kDirect;
-  double time_budget_s = 0.0;  ///< 0: none.
+  RestKind rest = RestKind::kMesh;  ///< kMetric: kDirect only.
+  double time_budget_s = 0.0;       ///< 0: none.
   std::function<bool()> cancelled;
   std::function<void(const std::string& stage)> progress;
   int redrapes = 20;
+  /// Whether to look for a proof, and for the stiffness that would do, where nothing is found.
+  bool explain = true;
 };
 
 struct InversionResult {
   InversionStatus status = InversionStatus::kNotConverged;
   std::string reason;  ///< One sentence without a full stop; empty if certified.
-  Points3 rest;
+  Points3 rest;  ///< Of RestKind::kMetric: the target, whose masses and hinge weights it keeps.
+  std::optional<ElementRest> element_rest;  ///< Of RestKind::kMetric, if one was found.
   Eigen::VectorXd rotations;
   Points3 contact_forces;  ///< 3 x contacts [N], on the shell.
   Certificate certificate;
-  std::optional<SlidingProof> proof;  ///< Of kInfeasible.
+  std::optional<SlidingProof> proof;  ///< Of kInfeasible; or the next.
+  std::optional<SoftnessProof> softness_proof;
+  /// With it: multiples of all stiffness up to which no metric rest state exists, and one at which
+  /// one was found, if there was time.
+  double stiffness_factor_proved_below = 1.0;
+  std::optional<double> stiffness_factor_min;
+  /// Of a rest shape that was not found: smallest eigenvalue of a metric rest state that was.
+  std::optional<double> metric_lambda_min_per_s2;
   /// Share of gravity that was balanced. Below 1 the rest shape is that of a material 1 / this
   /// times as stiff, whose stability was not looked at.
   double load_balanced = 0.0;

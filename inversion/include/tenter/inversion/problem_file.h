@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@ Result<nlohmann::json> problemToJson(const ProblemFile& problem);
 struct StoredInversion {
   InversionProblem problem;  ///< With the contacts of the certificate.
   Points3 rest;
+  std::optional<ElementRest> element_rest;  ///< Of a metric rest state.
   std::vector<std::unique_ptr<Obstacle>> obstacles;
   double friction = 0.0;
 };

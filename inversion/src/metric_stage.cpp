@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "metric_stage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "contact_forces.h"
+#include "metric_barrier.h"
+#include "soft_modes.h"
+
+namespace tenter {
+namespace {
+
+constexpr int kMaxRounds = 60;
+/// Soft motions that the search begins with, that a round adds at most, and that it keeps.
+constexpr int kFirstModes = 16, kMoreModes = 10, kKeptModes = 24;
+/// The restricted problem asks for this times the floor.
+constexpr double kOvershoot = 4.0;
+/// Modes this far above the lowest one, in its own size, are no danger.
+constexpr double kDangerous = 0.9;
+constexpr int kBisections = 8;
+constexpr ConeMargin kMargin{0.9, 0.3};
+
+class Search {
+ public:
+  Search(InverseShell& shell, const RestNewton& problem, const MetricElements& elements,
+         const MetricOptions& options)
+      : shell_(shell),
+        problem_(problem),
+        elements_(elements),
+        options_(options),
+        barrier_(shell, elements, problem.fixed(), problem.contacts()),
+        held_(problem.fixed()) {
+    for (const Contact& c : problem.contacts()) held_.push_back(c.vertex);
+    std::vector<char> is_held(static_cast<std::size_t>(shell.vertexCount()), 0);
+    for (const int v : held_) is_held[v] = 1;
+    for (int v = 0; v < shell.vertexCount(); ++v)
+      for (int a = 0; a < 3 && !is_held[v]; ++a) free_.push_back(3 * v + a);
+  }
+
+  MetricResult run() {
+    const std::optional<Eigen::VectorXd> least = leastEnergy();
+    if (least && lambdaAt(*least) >= options_.lambda_floor_per_s2) return found(*least);
+    const auto balanced = barrier_.balance({options_.stop});
+    if (balanced == MetricBarrier::Outcome::kInfeasible) return proved();
+    if (balanced != MetricBarrier::Outcome::kReached) return finish();
+    say("balanced", 0.0);
+    Eigen::MatrixXd columns = modesAt(Eigen::VectorXd::Zero(elements_.count()), kFirstModes).second;
+    for (int round = 0; round < kMaxRounds && !stopped(); ++round) {
+      const auto outcome =
+          barrier_.stabilize(columns, kOvershoot * options_.lambda_floor_per_s2, {options_.stop});
+      if (outcome == MetricBarrier::Outcome::kInfeasible) return proved();
+      say("restricted", barrier_.lambda_per_s2());
+      const auto [values, vectors] = modesAt(barrier_.z(), kMoreModes);
+      if (values.size() == 0) break;
+      say("stability", values[0]);
+      if (outcome == MetricBarrier::Outcome::kStalled && barrier_.lambda_per_s2() < 0.0) break;
+      if (values[0] >= options_.lambda_floor_per_s2) return found(nearer(least));
+      Eigen::Index more = 0;
+      const double danger = values[0] + kDangerous * std::abs(values[0]);
+      while (more < values.size() && values[more] < danger) ++more;
+      const Eigen::MatrixXd kept = barrier_.softest(columns, kKeptModes);
+      columns.resize(vectors.rows(), kept.cols() + more);
+      columns << kept, vectors.leftCols(more);
+    }
+    return finish();
+  }
+
+ private:
+  /// The state of least elastic energy, if it lies within bounds.
+  std::optional<Eigen::VectorXd> leastEnergy() {
+    auto forces = ContactForces::create(shell_, problem_);
+    if (!forces) return std::nullopt;
+    const RestUnknowns target{problem_.pose(), Eigen::VectorXd::Zero(shell_.rotationCount())};
+    const auto solved = forces->solve(problem_.gradient(target, 1.0), kMargin, 1.0, options_.stop);
+    factorizations_ += solved.factorizations;
+    if (!solved.converged) return std::nullopt;
+    Eigen::VectorXd z = elements_.works(solved.motion);
+    for (int i = 0; i < elements_.count(); ++i) z[i] /= elements_.all()[i].stiffness;
+    if (!barrier_.inside(z)) return std::nullopt;
+    return z;
+  }
+
+  std::pair<Eigen::VectorXd, Eigen::MatrixXd> modesAt(const Eigen::VectorXd& z, int count) {
+    shell_.setElementRest(elements_.restOf(z));
+    auto system = shell_.system(problem_.pose(), held_);
+    shell_.setElementRest(std::nullopt);
+    if (!system) return {};
+    ClothState state = system->restState();
+    const SparseLower& h = system->hessian(state, Projection::kNone);
+    if (!cholesky_) cholesky_.emplace(h);
+    const SoftModes modes = softModes(h, system->dofMass(), *cholesky_, count);
+    factorizations_ += modes.factorizations;
+    Eigen::MatrixXd full = Eigen::MatrixXd::Zero(3 * shell_.vertexCount(), modes.vectors.cols());
+    for (std::size_t k = 0; k < free_.size(); ++k)
+      full.row(free_[k]) = modes.vectors.row(static_cast<Eigen::Index>(k));
+    return {modes.values, full};
+  }
+
+  double lambdaAt(const Eigen::VectorXd& z) {
+    const auto values = modesAt(z, 1).first;
+    return values.size() > 0 ? values[0] : -1.0;
+  }
+
+  /// As near the state of least energy as stays stable: on the way there H changes linearly, and
+  /// bounds and cones are convex.
+  Eigen::VectorXd nearer(const std::optional<Eigen::VectorXd>& least) {
+    const Eigen::VectorXd stable = barrier_.z();
+    if (!least) return stable;
+    double good = 1.0, bad = 0.0;
+    for (int k = 0; k < kBisections && !stopped(); ++k) {
+      const double middle = 0.5 * (good + bad);
+      const bool holds =
+          lambdaAt(*least + middle * (stable - *least)) >= options_.lambda_floor_per_s2;
+      (holds ? good : bad) = middle;
+    }
+    return *least + good * (stable - *least);
+  }
+
+  MetricResult found(const Eigen::VectorXd& z) {
+    barrier_.set(z);
+    MetricResult out = finish();
+    out.rest = elements_.restOf(barrier_.z());
+    out.lambda_min_per_s2 = lambdaAt(barrier_.z());
+    return out;
+  }
+
+  MetricResult proved() {
+    MetricResult out = finish();
+    out.proof = barrier_.proof();
+    return out;
+  }
+
+  MetricResult finish() const {
+    MetricResult out;
+    out.factorizations = factorizations_ + barrier_.factorizations();
+    return out;
+  }
+
+  bool stopped() const { return options_.stop && options_.stop(); }
+  void say(const char* stage, double lambda) const {
+    if (options_.progress) options_.progress(stage, lambda);
+  }
+
+  InverseShell& shell_;
+  const RestNewton& problem_;
+  const MetricElements& elements_;
+  const MetricOptions& options_;
+  MetricBarrier barrier_;
+  std::vector<int> held_, free_;
+  std::optional<SparseCholesky> cholesky_;
+  int factorizations_ = 0;
+};
+
+}  // namespace
+
+Result<MetricResult> findMetricRest(InverseShell& shell, const RestNewton& problem,
+                                    const MetricOptions& options) {
+  const auto elements = MetricElements::create(shell);
+  if (!elements) return elements.error();
+  return Search(shell, problem, *elements, options).run();
+}
+
+}  // namespace tenter

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "rest_newton.h"
+#include "tenter/inversion/softness_proof.h"
+
+namespace tenter {
+
+struct MetricOptions {
+  double lambda_floor_per_s2 = 0.0;  ///< What the smallest eigenvalue has to reach.
+  std::function<bool()> stop;
+  std::function<void(const char* stage, double lambda_min_per_s2)> progress;
+};
+
+/// Of all rest lengths and angles within bounds (MetricElements), some for which the target is a
+/// stable equilibrium with every contact force in its cone, or the proof that there are none.
+struct MetricResult {
+  std::optional<ElementRest> rest;     ///< Found: balanced and stable.
+  std::optional<SoftnessProof> proof;  ///< None exists.
+  double lambda_min_per_s2 = 0.0;
+  int factorizations = 0;
+};
+
+/// Least elastic energy first, which is as good as it gets where it is stable (the convex choice of
+/// contact forces); else an interior-point method over all states, with the Hessian kept positive
+/// on a growing space of soft motions (docs/inversion.md). Error: a material without element rest.
+Result<MetricResult> findMetricRest(InverseShell& shell, const RestNewton& problem,
+                                    const MetricOptions& options);
+
+}  // namespace tenter
