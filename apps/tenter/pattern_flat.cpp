@@ -41,7 +41,12 @@ Result<int> run(const Options& o, Console& console) {
   if (auto free = checkOutputFile(o.output, kMarker); !free) return free.error();
   const std::filesystem::path place = o.surface;
   std::error_code error;
-  const auto file = std::filesystem::is_directory(place, error) ? place / "rest.obj" : place;
+  const bool folder = std::filesystem::is_directory(place, error);
+  if (folder && std::filesystem::exists(place / "metric.json", error))
+    return badInput(o.surface, "",
+                    "is a metric rest state, whose lengths and angles fit no surface",
+                    "invert the target with --rest mesh");
+  const auto file = folder ? place / "rest.obj" : place;
   const auto mesh = readMesh(file);
   if (!mesh) return mesh.error();
   const auto pattern = unroll(mesh->mesh, {1e-2 * o.distortion_percent, o.max_cuts});

@@ -251,7 +251,9 @@ Result<int> run(const Options& o, Console& console) {
     spdlog::info("{}", stage);
     progress->show(-1.0, stage);
   };
-  const auto placed = [&](const Error& e) { return e.file.empty() ? e.in(o.target) : e; };
+  const auto placed = [&](const Error& e) {
+    return e.file.empty() && e.kind != ErrorKind::kUsage ? e.in(o.target) : e;
+  };
   if (!o.range) {
     const auto result = invert(*problem, options);
     progress.reset();

@@ -28,7 +28,9 @@ constexpr std::array kMargins{ConeMargin{0.9, 0.3}, ConeMargin{0.975, 0.02},
 /// Of the load's steps, when all of it at once is too much.
 constexpr double kLoadShrink = 0.25, kLoadGrowth = 1.5, kLeastLoadStep = 0.01;
 constexpr int kMaxChoices = 5;
-/// For the stiffness at which a metric rest state exists.
+/// Most for a proof where no rest mesh is found; and for the stiffness at which a metric rest state
+/// exists.
+constexpr double kExplanation_s = 120.0;
 constexpr double kStiffnessSearch_s = 20.0;
 /// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
 constexpr double kLambdaFloor_per_s2 = 0.05;
@@ -44,6 +46,8 @@ class Inverter {
 
   Result<InversionResult> run() {
     forgetRest();
+    if (options_.rest == RestKind::kMetric)
+      if (const auto possible = checkMetricRest(shell_); !possible) return possible.error();
     if (problem_.fixed.empty())
       out_.proof = findSlidingProof(problem_.contacts, problem_.material.gravity_m_per_s2);
     if (out_.proof) return finish();
@@ -127,8 +131,9 @@ class Inverter {
   }
 
   Result<InversionResult> metric() {
-    auto found = metricRest(shell_, newton_, stopping());
+    auto found = metricRest(shell_, newton_, [this] { return stopped(); });
     if (!found) return found.error();
+    out_.factorizations += found->factorizations;
     out_.softness_proof = std::move(found->proof);
     out_.element_rest = std::move(found->rest);
     if (out_.element_rest) load_ = 1.0;
@@ -136,8 +141,9 @@ class Inverter {
     return finish();
   }
 
-  std::function<bool()> stopping() const {
-    return [this] { return stopped(); };
+  /// True once that time is over, or the user or the budget ends it all.
+  std::function<bool()> until(double seconds_from_now) const {
+    return [this, end = seconds() + seconds_from_now] { return stopped() || seconds() > end; };
   }
 
   Result<MetricResult> metricRest(InverseShell& shell, const RestNewton& newton,
@@ -148,19 +154,21 @@ class Inverter {
     o.progress = [this](const char* stage, double lambda) {
       say((std::string("metric rest state: ") + stage + ", lambda_min %.4g").c_str(), lambda);
     };
-    auto found = findMetricRest(shell, newton, o);
-    if (found) out_.factorizations += found->factorizations;
-    return found;
+    return findMetricRest(shell, newton, o);
   }
 
   /// No rest shape was found: perhaps not even a metric rest state exists.
   void explainFailure() {
-    if (!options_.explain || !hasElementRest(shell_.material())) return;
+    if (!options_.explain || !hasElementRest(shell_.material()) ||
+        options_.method == InversionMethod::kReference)
+      return;
     if (options_.rest == RestKind::kMesh) {
-      const auto found = metricRest(shell_, newton_, stopping());
+      // A stable equilibrium that only re-draping leaves needs another reason.
+      if (out_.certificate.balanced() && out_.certificate.stable()) return;
+      const auto found = metricRest(shell_, newton_, until(kExplanation_s));
       if (!found) return;
       out_.softness_proof = found->proof;
-      if (found->rest) out_.metric_lambda_min_per_s2 = found->lambda_min_per_s2;
+      if (found->stable) out_.metric_lambda_min_per_s2 = found->lambda_min_per_s2;
     }
     if (out_.softness_proof) searchStiffness();
   }
@@ -170,9 +178,7 @@ class Inverter {
   void searchStiffness() {
     double& low = out_.stiffness_factor_proved_below;
     std::optional<double>& high = out_.stiffness_factor_min;
-    const std::function<bool()> stop = [this, end = seconds() + kStiffnessSearch_s] {
-      return stopped() || seconds() > end;
-    };
+    const std::function<bool()> stop = until(kStiffnessSearch_s);
     for (double factor = 2.0; !high && factor <= kStiffestFactor; factor *= 2.0)
       if (!narrow(factor, stop)) return;
     while (high && *high / low > kRangeRatio)
@@ -186,8 +192,8 @@ class Inverter {
     if (!shell) return false;
     const RestNewton newton(*shell, problem_.target.positions, problem_.fixed, problem_.contacts);
     const auto found = metricRest(*shell, newton, stop);
-    if (!found || (!found->rest && !found->proof)) return false;
-    if (found->rest)
+    if (!found || (!found->stable && !found->proof)) return false;
+    if (found->stable)
       out_.stiffness_factor_min = factor;
     else
       out_.stiffness_factor_proved_below = factor;
@@ -243,33 +249,53 @@ class Inverter {
                                problem_.fixed, problem_.contacts, c);
     if (!certificate) return certificate.error();
     out_.certificate = std::move(certificate).value();
-    const bool certified = out_.certificate.holds();
-    if (!certified && !out_.proof && !stopped()) explainFailure();
+    out_.status = out_.certificate.holds() ? InversionStatus::kCertified
+                  : out_.proof             ? InversionStatus::kInfeasible
+                  : stopped()              ? InversionStatus::kBudget
+                                           : InversionStatus::kNotConverged;
+    if (out_.status == InversionStatus::kNotConverged) explainFailure();
+    if (out_.softness_proof) out_.status = InversionStatus::kInfeasible;
+    out_.reason = reason();
     out_.seconds = seconds();
-    if (certified) {
-      out_.status = InversionStatus::kCertified;
-    } else if (out_.proof) {
-      out_.status = InversionStatus::kInfeasible;
-      out_.reason = "the shell slides off as a whole, whatever its rest shape";
-    } else if (out_.softness_proof) {
-      out_.status = InversionStatus::kInfeasible;
-      out_.reason =
-          out_.softness_proof->modes.empty()
-              ? "no rest lengths and angles balance the weight without stretching an edge "
-                "to more than double: the material is too soft"
-              : "no rest lengths and angles are stable: the material is too soft";
-    } else if (stopped()) {
-      out_.status = InversionStatus::kBudget;
-      out_.reason = options_.cancelled && options_.cancelled() ? "stopped" : "time ran out";
-    } else {
-      out_.reason =
-          !out_.certificate.balanced() ? "no rest shape was found that balances the forces"
-          : !out_.certificate.stable() ? "the equilibrium that was found is not stable"
-                                       : "a perturbed shell does not return to the target";
-      if (out_.metric_lambda_min_per_s2)
-        out_.reason += "; rest lengths and angles that fit no mesh would hold it (--rest metric)";
-    }
     return out_;
+  }
+
+  std::string reason() const {
+    switch (out_.status) {
+      case InversionStatus::kCertified:
+        return "";
+      case InversionStatus::kBudget:
+        return options_.cancelled && options_.cancelled() ? "stopped" : "time ran out";
+      case InversionStatus::kInfeasible:
+        return out_.softness_proof ? softnessReason(*out_.softness_proof)
+                                   : "the shell slides off as a whole, whatever its rest shape";
+      case InversionStatus::kNotConverged:
+        break;
+    }
+    std::string text =
+        !out_.certificate.balanced() ? "no rest shape was found that balances the forces"
+        : !out_.certificate.stable() ? "the equilibrium that was found is not stable"
+                                     : "a perturbed shell does not return to the target";
+    if (out_.metric_lambda_min_per_s2)
+      text += "; rest lengths and angles that fit no mesh would hold it (--rest metric)";
+    return text;
+  }
+
+  /// With what the proof leaves out.
+  std::string softnessReason(const SoftnessProof& proof) const {
+    char text[400];
+    std::snprintf(
+        text, sizeof text,
+        "the material is too soft: no rest lengths from half to twice the target's and no "
+        "rest angles %s, with hinge weights and masses within %.2g %% of the target's",
+        proof.modes.empty() ? "balance the weight" : "are stable", 100.0 * proof.weight_change);
+    std::string out = text;
+    if (out_.stiffness_factor_min) {
+      std::snprintf(text, sizeof text, "; %.3g times as stiff a metric rest state exists",
+                    *out_.stiffness_factor_min);
+      out += text;
+    }
+    return out;
   }
 
   /// dE/dq at the target [N].

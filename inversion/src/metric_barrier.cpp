@@ -150,8 +150,8 @@ void MetricBarrier::weigh(const Eigen::VectorXd& z, const Eigen::VectorXd& f) {
       inverse_f_[i] = value * value * c.normal * c.normal.transpose();
       continue;
     }
-    const Mat3 metric =
-        (1.0 + c.friction * c.friction) * c.normal * c.normal.transpose() - Mat3::Identity();
+    const Mat3 along = c.normal * c.normal.transpose();
+    const Mat3 metric = c.friction * c.friction * along - (Mat3::Identity() - along);
     const Vec3 slope = 2.0 * metric * at;
     slope_f_.segment<3>(3 * static_cast<Eigen::Index>(i)) = -slope / value;
     const Mat3 curvature = slope * slope.transpose() / (value * value) - 2.0 / value * metric;
@@ -213,8 +213,11 @@ Eigen::MatrixXd MetricBarrier::reduced(const Eigen::MatrixXd& columns) {
   Eigen::MatrixXd pulled = Eigen::MatrixXd::Zero(row_count_, columns.cols());
   Eigen::MatrixXd out(columns.rows(), columns.cols());
   const auto inBlocks = [&](const auto& work) {
-    tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, columns.cols(), kColumns),
-                      [&](const auto& range) { work(range.begin(), range.end() - range.begin()); });
+    // Always the same parts: rounding must not depend on which thread is free.
+    tbb::parallel_for(
+        tbb::blocked_range<Eigen::Index>(0, columns.cols(), kColumns),
+        [&](const auto& range) { work(range.begin(), range.end() - range.begin()); },
+        tbb::simple_partitioner());
   };
   inBlocks([&](Eigen::Index first, Eigen::Index count) {
     auto part = out.middleCols(first, count);
@@ -287,17 +290,17 @@ void MetricBarrier::mend() {
 Eigen::VectorXd MetricBarrier::forcesOf(const Eigen::VectorXd& z) const {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(contacts_.size()));
   const Eigen::VectorXd left = residual(z, out);
-  for (std::size_t i = 0; i < contacts_.size(); ++i)
-    out.segment<3>(3 * static_cast<Eigen::Index>(i)) = left.segment<3>(rowOf(contacts_[i].vertex));
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    const Contact& c = contacts_[i];
+    Vec3 force = left.segment<3>(rowOf(c.vertex));
+    if (c.friction <= 0.0) force = force.dot(c.normal) * c.normal;  // the rest is not balanced
+    out.segment<3>(3 * static_cast<Eigen::Index>(i)) = force;
+  }
   return out;
 }
 
 bool MetricBarrier::inside(const Eigen::VectorXd& z) const {
   return std::isfinite(barrier(z, forcesOf(z)));
-}
-
-Points3 MetricBarrier::contactForces() const {
-  return unit_N_ * Eigen::Map<const Points3>(f_.data(), 3, f_.size() / 3);
 }
 
 /// A proof counts once it has been checked.

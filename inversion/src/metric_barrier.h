@@ -16,9 +16,10 @@ namespace tenter {
 /// is central enough for more of what is wanted, and how much more.
 inline constexpr double kLeastBarrierStep = 1e-9, kToBorder = 0.9, kShorterStep = 0.7,
                         kSufficientDecrease = 1e-4;
+inline constexpr double kCentralDecrement = 1.0, kBarrierGrowth = 5.0;
+
 /// Steps by which a proof is improved once there is one.
 inline constexpr int kImprovements = 8;
-inline constexpr double kCentralDecrement = 1.0, kBarrierGrowth = 5.0;
 
 /// Interior-point method over metric rest states: elements' z within their bounds and contact
 /// forces f inside their cones, balanced: sum of z g + dE_weight/dx = f at contacts, 0 elsewhere,
@@ -51,7 +52,6 @@ class MetricBarrier {
   const Eigen::VectorXd& z() const { return z_; }
   /// Takes another balanced state, and mends what rounding left of it.
   void set(const Eigen::VectorXd& z);
-  Points3 contactForces() const;                          ///< 3 x contacts [N].
   bool inside(const Eigen::VectorXd& z) const;            ///< Bounds, and cones by the forces of z.
   double lambda_per_s2() const { return lambda_; }        ///< Reached by stabilize().
   double boundOnLambda_per_s2() const { return bound_; }  ///< What no state exceeds there.

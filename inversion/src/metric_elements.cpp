@@ -58,7 +58,9 @@ MetricElement hingeElement(const MeshEdge& edge, int id, const Points3& x, doubl
 
 Result<MetricElements> MetricElements::create(const InverseShell& shell) {
   const ClothLaws& laws = shell.material().laws;
-  if (!hasElementRest(shell.material()) || !laws.bending || !isConstant(*laws.membrane) ||
+  if (hasElementRest(shell.material()) && !laws.bending)
+    return usageError("a metric rest state needs a bending stiffness", "give --k-bend above 0");
+  if (!hasElementRest(shell.material()) || !isConstant(*laws.membrane) ||
       !isConstant(*laws.bending)) {
     return usageError(
         "a metric rest state is known for edges and hinges of constant stiffness only",

@@ -34,8 +34,6 @@ class MetricElements {
 
   const std::vector<MetricElement>& all() const { return all_; }
   int count() const { return static_cast<int>(all_.size()); }
-  int vertexCount() const { return vertices_; }
-  int edgeCount() const { return edges_; }
 
   Eigen::VectorXd forces(const Eigen::VectorXd& z) const;      ///< Sum of z g: 3 a vertex [N].
   Eigen::VectorXd works(const Eigen::VectorXd& motion) const;  ///< g . motion of each element.

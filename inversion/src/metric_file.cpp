@@ -13,6 +13,7 @@ namespace tenter {
 namespace {
 
 constexpr int kVersion = 1;
+constexpr double kMostStretch = 100.0;
 
 nlohmann::json listOf(const Eigen::VectorXd& values) {
   return std::vector<double>(values.begin(), values.end());
@@ -31,7 +32,7 @@ Result<void> writeElementRest(const std::filesystem::path& file, const MeshTopol
   return writeFileAtomically(file, json.dump() + "\n");
 }
 
-Result<ElementRest> readElementRest(const std::filesystem::path& file,
+Result<ElementRest> readElementRest(const std::filesystem::path& file, const Points3& pose,
                                     const MeshTopology& topology) {
   const auto json = readJsonFile(file);
   if (!json) return json.error();
@@ -47,7 +48,9 @@ Result<ElementRest> readElementRest(const std::filesystem::path& file,
     const auto& ends = topology.edges[static_cast<std::size_t>(e)].vertices;
     if (edges(e, 0) != ends[0] || edges(e, 1) != ends[1])
       in.fail("edges" + place, "is another edge than that of pose.vtp");
-    if (!(rest.length_m[e] > 0.0)) in.fail("rest_length_m" + place, "is not positive");
+    const double length = (pose.col(ends[1]) - pose.col(ends[0])).norm();
+    if (!(rest.length_m[e] * kMostStretch >= length && rest.length_m[e] <= kMostStretch * length))
+      in.fail("rest_length_m" + place, "is not within a factor of 100 of the edge's length");
     if (!(std::abs(rest.angle_rad[e]) <= std::numbers::pi))
       in.fail("rest_angle_rad" + place, "lies beyond pi");
   }

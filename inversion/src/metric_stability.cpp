@@ -24,6 +24,8 @@ constexpr double kNothingLeft = 1e-3;
 constexpr double kLightMode = 1e-12;
 constexpr int kRefinements = 3;
 constexpr Eigen::Index kColumns = 96;  ///< Solved for together, between looks at the time.
+/// Of the largest: inertia of a column that the others hold already.
+constexpr double kDependent = 1e-10;
 /// Steps shorter than this no longer lead anywhere.
 constexpr double kNoStep = 1e-6;
 constexpr double kDrawnInwards = 0.2;
@@ -49,13 +51,26 @@ Eigen::MatrixXd unpack(const Eigen::VectorXd& packed, Eigen::Index size) {
   return out;
 }
 
+/// M-orthonormal columns of the same span, without those that depend on others.
+void orthonormalize(Eigen::MatrixXd& columns, const Eigen::VectorXd& mass) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> inertia(columns.transpose() *
+                                                               mass.asDiagonal() * columns);
+  const Eigen::VectorXd& values = inertia.eigenvalues();
+  Eigen::Index first = 0;
+  while (first + 1 < values.size() && values[first] < kDependent * values[values.size() - 1])
+    ++first;
+  const Eigen::Index count = values.size() - first;
+  columns = (columns * inertia.eigenvectors().rightCols(count) *
+             values.tail(count).cwiseSqrt().cwiseInverse().asDiagonal())
+                .eval();
+}
+
 /// H(z) and its derivatives between some columns.
 class Reduced {
  public:
   Reduced(const MetricElements& elements, Eigen::MatrixXd& columns, const Eigen::VectorXd& mass)
       : elements_(elements), columns_(columns) {
-    const Eigen::LLT<Eigen::MatrixXd> inertia(columns.transpose() * mass.asDiagonal() * columns);
-    columns = inertia.matrixL().solve(columns.transpose()).transpose();
+    orthonormalize(columns, mass);
     elastic_ = Eigen::MatrixXd::Zero(size(), size());
     for (const MetricElement& e : elements.all()) {
       Eigen::VectorXd work = Eigen::VectorXd::Zero(size());
@@ -250,12 +265,14 @@ class MetricBarrier::Stability {
       if (stop && stop()) return false;
       const Eigen::Index count = std::min(kColumns, system.cols() - first);
       const Eigen::MatrixXd answers = b_.reduced(by_z_.middleCols(first, count));
-      tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, system.rows(), kColumns),
-                        [&](const auto& range) {
-                          const auto rows = range.end() - range.begin();
-                          system.block(range.begin(), first, rows, count).noalias() =
-                              by_z_.middleCols(range.begin(), rows).transpose() * answers;
-                        });
+      tbb::parallel_for(
+          tbb::blocked_range<Eigen::Index>(0, system.rows(), kColumns),
+          [&](const auto& range) {
+            const auto rows = range.end() - range.begin();
+            system.block(range.begin(), first, rows, count).noalias() =
+                by_z_.middleCols(range.begin(), rows).transpose() * answers;
+          },
+          tbb::simple_partitioner());
     }
     system.diagonal().array() += 1.0;
     solver_.compute(0.5 * (system + system.transpose()));

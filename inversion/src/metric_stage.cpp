@@ -20,6 +20,7 @@ constexpr double kOvershoot = 4.0;
 /// Modes this far above the lowest one, in its own size, are no danger.
 constexpr double kDangerous = 0.9;
 constexpr int kBisections = 8;
+constexpr double kMostProducts = 5e7;  ///< Numbers of the interior-point method's largest matrix.
 constexpr ConeMargin kMargin{0.9, 0.3};
 
 class Search {
@@ -41,22 +42,28 @@ class Search {
 
   MetricResult run() {
     const std::optional<Eigen::VectorXd> least = leastEnergy();
-    if (least && lambdaAt(*least) >= options_.lambda_floor_per_s2) return found(*least);
+    if (least && isStable(*least)) return found(*least, true);
     const auto balanced = barrier_.balance({options_.stop});
     if (balanced == MetricBarrier::Outcome::kInfeasible) return proved();
-    if (balanced != MetricBarrier::Outcome::kReached) return finish();
+    if (balanced != MetricBarrier::Outcome::kReached) return counted({});
     say("balanced", 0.0);
+    if (free_.empty()) return found(barrier_.z(), true);
     Eigen::MatrixXd columns = modesAt(Eigen::VectorXd::Zero(elements_.count()), kFirstModes).second;
     for (int round = 0; round < kMaxRounds && !stopped(); ++round) {
+      if (columns.cols() == 0 || !affordable(columns.cols())) break;
       const auto outcome =
           barrier_.stabilize(columns, kOvershoot * options_.lambda_floor_per_s2, {options_.stop});
       if (outcome == MetricBarrier::Outcome::kInfeasible) return proved();
       say("restricted", barrier_.lambda_per_s2());
+      // Neither enough nor provably nothing can be reached.
+      if (outcome == MetricBarrier::Outcome::kStalled &&
+          (barrier_.lambda_per_s2() < 0.0 ||
+           barrier_.boundOnLambda_per_s2() < options_.lambda_floor_per_s2))
+        break;
       const auto [values, vectors] = modesAt(barrier_.z(), kMoreModes);
       if (values.size() == 0) break;
       say("stability", values[0]);
-      if (outcome == MetricBarrier::Outcome::kStalled && barrier_.lambda_per_s2() < 0.0) break;
-      if (values[0] >= options_.lambda_floor_per_s2) return found(nearer(least));
+      if (values[0] >= options_.lambda_floor_per_s2) return found(nearer(least), true);
       Eigen::Index more = 0;
       const double danger = values[0] + kDangerous * std::abs(values[0]);
       while (more < values.size() && values[more] < danger) ++more;
@@ -64,7 +71,7 @@ class Search {
       columns.resize(vectors.rows(), kept.cols() + more);
       columns << kept, vectors.leftCols(more);
     }
-    return finish();
+    return found(barrier_.z(), false);
   }
 
  private:
@@ -98,6 +105,17 @@ class Search {
     return {modes.values, full};
   }
 
+  bool isStable(const Eigen::VectorXd& z) {
+    return free_.empty() || lambdaAt(z) >= options_.lambda_floor_per_s2;
+  }
+
+  /// Whether the products of that many motions, one row an element, are no burden on memory.
+  bool affordable(Eigen::Index motions) const {
+    return static_cast<double>(elements_.count()) * 0.5 * static_cast<double>(motions) *
+               static_cast<double>(motions + 1) <=
+           kMostProducts;
+  }
+
   double lambdaAt(const Eigen::VectorXd& z) {
     const auto values = modesAt(z, 1).first;
     return values.size() > 0 ? values[0] : -1.0;
@@ -111,29 +129,28 @@ class Search {
     double good = 1.0, bad = 0.0;
     for (int k = 0; k < kBisections && !stopped(); ++k) {
       const double middle = 0.5 * (good + bad);
-      const bool holds =
-          lambdaAt(*least + middle * (stable - *least)) >= options_.lambda_floor_per_s2;
+      const bool holds = isStable(*least + middle * (stable - *least));
       (holds ? good : bad) = middle;
     }
     return *least + good * (stable - *least);
   }
 
-  MetricResult found(const Eigen::VectorXd& z) {
+  MetricResult found(const Eigen::VectorXd& z, bool stable) {
     barrier_.set(z);
-    MetricResult out = finish();
+    MetricResult out;
     out.rest = elements_.restOf(barrier_.z());
-    out.lambda_min_per_s2 = lambdaAt(barrier_.z());
-    return out;
+    out.stable = stable;
+    if (!free_.empty()) out.lambda_min_per_s2 = lambdaAt(barrier_.z());
+    return counted(std::move(out));
   }
 
   MetricResult proved() {
-    MetricResult out = finish();
+    MetricResult out;
     out.proof = barrier_.proof();
-    return out;
+    return counted(std::move(out));
   }
 
-  MetricResult finish() const {
-    MetricResult out;
+  MetricResult counted(MetricResult out) const {
     out.factorizations = factorizations_ + barrier_.factorizations();
     return out;
   }
@@ -155,10 +172,17 @@ class Search {
 
 }  // namespace
 
+Result<void> checkMetricRest(const InverseShell& shell) {
+  const auto elements = MetricElements::create(shell);
+  if (!elements) return elements.error();
+  return {};
+}
+
 Result<MetricResult> findMetricRest(InverseShell& shell, const RestNewton& problem,
                                     const MetricOptions& options) {
   const auto elements = MetricElements::create(shell);
   if (!elements) return elements.error();
+  if (auto free = shell.system(problem.pose(), problem.fixed()); !free) return free.error();
   return Search(shell, problem, *elements, options).run();
 }
 

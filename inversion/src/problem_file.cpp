@@ -73,6 +73,10 @@ Result<void> readContacts(const fs::path& file, StoredInversion& out) {
   const int vertices = out.problem.target.vertexCount();
   if (in.integer("schema_version", 1, std::numeric_limits<int>::max()) != kInversionSchemaVersion)
     in.fail("schema_version", "is of another version");
+  const bool metric = in.has("rest") && in.text("rest") == "metric";
+  if (metric && !out.element_rest)
+    return badInput(file.string(), "rest", "is metric, but there is no metric.json beside it",
+                    "invert the target again");
   std::vector<char> taken(static_cast<std::size_t>(vertices), 0);
   for (const int v : out.problem.fixed) taken[static_cast<std::size_t>(v)] = 1;
   const std::size_t count = in.ok() ? in.arraySize("contacts") : 0;
@@ -118,7 +122,8 @@ Result<void> readMeshes(const fs::path& folder, StoredInversion& out) {
   }
   std::error_code error;
   if (fs::exists(folder / kMetricFile, error)) {
-    auto metric = readElementRest(folder / kMetricFile, buildTopology(target->mesh).value());
+    auto metric = readElementRest(folder / kMetricFile, target->mesh.positions,
+                                  buildTopology(target->mesh).value());
     if (!metric) return metric.error();
     out.element_rest = *std::move(metric);
   }

@@ -2,6 +2,7 @@
 #include "tenter/inversion/softness_proof.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -11,22 +12,24 @@
 namespace tenter {
 namespace {
 
-/// Of the sum of all terms' sizes: what rounding may make of the bound.
-constexpr double kRounding = 1e-9;
-/// Of the motion's largest entry.
-constexpr double kZero = 1e-12;
+/// Of the sum of the sizes of all products, before any of them cancel: what rounding may make of
+/// the bound.
+constexpr double kRounding = 1e-11;
 constexpr int kBisections = 12;
 
 /// Adds the largest values that the terms of a proof can take.
 class Sum {
  public:
   explicit Sum(double weight_change) : most_(1.0 + weight_change) {}
-  void add(double value) {
+  /// @param size  of what was added up to `value`.
+  void add(double value, double size) {
     total_ += value;
-    size_ += std::abs(value);
+    size_ += size;
   }
   /// A term whose factor is what the hinge's weight or the triangle's mass may become.
-  void addWeighted(double value) { add(value > 0.0 ? value * most_ : value / most_); }
+  void addWeighted(double value, double size) {
+    add(value > 0.0 ? value * most_ : value / most_, most_ * size);
+  }
   double total() const { return total_; }
   double size() const { return size_; }
 
@@ -38,26 +41,33 @@ double largest(double slope, double lower, double upper) {
   return std::max(slope * lower, slope * upper);
 }
 
+/// What an edge's ends are moved by.
+struct Ends {
+  Vec3 begin, end;
+  Vec3 between() const { return end - begin; }
+  double size() const { return begin.norm() + end.norm(); }
+};
+
 void addEdges(const SoftnessProof& proof, const InverseShell& shell, Sum& sum) {
   const auto& edges = shell.topology().edges;
-  const Points3& x = shell.target().positions;
-  const auto between = [](const Points3& at, const std::array<int, 2>& v) {
-    return Vec3(at.col(v[1]) - at.col(v[0]));
-  };
   for (std::size_t e = 0; e < edges.size(); ++e) {
-    const auto& ends = edges[e].vertices;
+    const auto ends = [&](const Points3& of) {
+      return Ends{of.col(edges[e].vertices[0]), of.col(edges[e].vertices[1])};
+    };
     const double k =
         shell.material().laws.membrane->evaluate(Vec3::Zero(), static_cast<int>(e)).tangent(0, 0);
-    const Vec3 along = between(x, ends);
-    const double length = along.norm();
-    double stretched = 0.0, slope = k / length * along.dot(between(proof.motion, ends));
+    const Vec3 along = ends(shell.target().positions).between();
+    const double length = along.norm(), per_length = k / length;
+    const Ends moved = ends(proof.motion);
+    double stretched = 0.0, slope = per_length * along.dot(moved.between());
+    double size = k * moved.size();
     for (const Points3& mode : proof.modes) {
-      const Vec3 relative = between(mode, ends);
-      stretched += k / length * std::pow(relative.dot(along) / length, 2);
-      slope += k / length * relative.squaredNorm();
+      const Ends v = ends(mode);
+      stretched += per_length * std::pow(v.between().dot(along) / length, 2);
+      slope += per_length * v.between().squaredNorm();
+      size += 2.0 * per_length * v.size() * v.size();
     }
-    sum.add(stretched);
-    sum.add(largest(slope, 1.0 / kStretchLimit - 1.0, kStretchLimit - 1.0));
+    sum.add(stretched + largest(slope, 1.0 / kStretchLimit - 1.0, kStretchLimit - 1.0), size);
   }
 }
 
@@ -82,24 +92,32 @@ void addHinges(const SoftnessProof& proof, const InverseShell& shell, Sum& sum) 
     const double weight = 3.0 * (x.col(ids[1]) - x.col(ids[0])).squaredNorm() / area;
     const double k =
         shell.material().laws.bending->evaluate(Vec3::Zero(), hinge++).tangent(0, 0) * weight;
-    double bent = 0.0, slope = first.dot(gathered(proof.motion));
+    const Vec12 moved = gathered(proof.motion);
+    double bent = 0.0, slope = first.dot(moved), size = first.norm() * moved.norm();
     for (const Points3& mode : proof.modes) {
       const Vec12 v = gathered(mode);
       bent += std::pow(first.dot(v), 2);
       slope += v.dot(second * v);
+      size += (first.squaredNorm() + second.norm()) * v.squaredNorm();
     }
-    sum.addWeighted(k * (bent + largest(slope, -std::numbers::pi, std::numbers::pi)));
+    sum.addWeighted(k * (bent + largest(slope, -std::numbers::pi, std::numbers::pi)),
+                    std::numbers::pi * k * size);
   }
 }
 
 void addWeight(const SoftnessProof& proof, const InverseShell& shell, Sum& sum) {
   const SheetMesh sheet = shell.sheet(shell.target().positions);
   const ShellMaterial& material = shell.material();
+  const Vec3& gravity = material.gravity_m_per_s2;
   for (std::size_t t = 0; t < sheet.triangles.size(); ++t) {
     Vec3 moved = Vec3::Zero();
-    for (const int v : shell.target().triangles[t]) moved += proof.motion.col(v) / 3.0;
-    sum.addWeighted(-material.areal_density_kg_per_m2 * sheet.triangles[t].area_m2 *
-                    material.gravity_m_per_s2.dot(moved));
+    double size = 0.0;
+    for (const int v : shell.target().triangles[t]) {
+      moved += proof.motion.col(v) / 3.0;
+      size += proof.motion.col(v).norm() / 3.0;
+    }
+    const double mass = material.areal_density_kg_per_m2 * sheet.triangles[t].area_m2;
+    sum.addWeighted(-mass * gravity.dot(moved), mass * gravity.norm() * size);
   }
 }
 
@@ -108,13 +126,12 @@ bool isAdmissible(const SoftnessProof& proof, const InverseShell& shell,
                   const std::vector<int>& fixed, const std::vector<Contact>& contacts) {
   const int n = shell.vertexCount();
   if (proof.motion.cols() != n || !proof.motion.allFinite()) return false;
-  const double zero = kZero * proof.motion.cwiseAbs().maxCoeff();
   for (const int v : fixed)
     if (!proof.motion.col(v).isZero(0.0)) return false;
   for (const Contact& c : contacts) {
     const Vec3 y = proof.motion.col(c.vertex);
     const double normal = y.dot(c.normal);
-    if (normal < c.friction * (y - normal * c.normal).norm() - zero) return false;
+    if (normal < c.friction * (y - normal * c.normal).norm()) return false;
   }
   return std::ranges::all_of(proof.modes, [&](const Points3& mode) {
     if (mode.cols() != n || !mode.allFinite()) return false;

@@ -150,6 +150,11 @@ TEST_F(ResimulationTest, OtherMetricsAreRefusedByPlace) {
   EXPECT_NE(refusal("rest_length_m", 0.0).find("rest_length_m[3]"), std::string::npos);
   EXPECT_NE(refusal("rest_length_m", "x").find("rest_length_m"), std::string::npos);
   EXPECT_NE(refusal("rest_angle_rad", 4.0).find("rest_angle_rad[3]"), std::string::npos);
+  EXPECT_NE(refusal("rest_length_m", 1e-300).find("rest_length_m[3]"), std::string::npos);
+  std::filesystem::remove(file);
+  const auto without = readInversion(*folder_ / "spoiled");
+  ASSERT_FALSE(without.ok());
+  EXPECT_NE(without.error().message().find("metric.json"), std::string::npos);
 }
 
 TEST_F(ResimulationTest, WithMoreGravityItMovesAsLinearlyPredicted) {

@@ -23,7 +23,7 @@ struct InversionProblem {
 
 enum class InversionStatus {
   kCertified,
-  kInfeasible,    ///< Proved: no rest shape exists.
+  kInfeasible,    ///< Proved: no rest shape exists, within the bounds that the proof states.
   kNotConverged,  ///< None was found that the certificate holds for.
   kBudget,        ///< Time ran out first.
 };
@@ -48,7 +48,8 @@ struct InversionOptions {
   std::function<bool()> cancelled;
   std::function<void(const std::string& stage)> progress;
   int redrapes = 20;
-  /// Whether to look for a proof, and for the stiffness that would do, where nothing is found.
+  /// Whether to look for a proof, and for the stiffness that would do, where nothing is found: for
+  /// up to two minutes more, within the budget.
   bool explain = true;
 };
 

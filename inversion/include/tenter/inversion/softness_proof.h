@@ -22,8 +22,8 @@ struct SoftnessProof {
   /// With modes, which then have unit kinetic energy together (sum of v^T M v = 1): an upper bound
   /// on lambda_min [1/s^2], negative. Without: work [J], negative.
   double bound = 0.0;
-  /// The proof still holds if every hinge's weight 3 L0^2 / A and every triangle's mass are up to
-  /// this share more or less than the target's: what a rest mesh may change of them.
+  /// w: the proof still holds if every hinge's weight 3 L0^2 / A and every triangle's mass lie
+  /// between 1 / (1 + w) and 1 + w of the target's: what a rest mesh may change of them.
   double weight_change = 0.0;
 };
 
