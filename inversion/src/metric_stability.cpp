@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "metric_barrier.h"
+#include "reduced_hessian.h"
 #include "second_order_cone.h"
 
 namespace tenter {
@@ -24,94 +25,11 @@ constexpr double kNothingLeft = 1e-3;
 constexpr double kLightMode = 1e-12;
 constexpr int kRefinements = 3;
 constexpr Eigen::Index kColumns = 96;  ///< Solved for together, between looks at the time.
-/// Of the largest: inertia of a column that the others hold already.
-constexpr double kDependent = 1e-10;
 /// Steps shorter than this no longer lead anywhere.
 constexpr double kNoStep = 1e-6;
 constexpr double kDrawnInwards = 0.2;
 /// Of the complementarity: what a step leaves at least.
 constexpr double kLeastCentring = 0.02;
-
-/// Lower triangle by columns, what is off the diagonal times the root of two: dot products are
-/// those of the matrices.
-template <class Packed>
-void pack(const Eigen::MatrixXd& m, Packed&& out) {
-  Eigen::Index k = 0;
-  for (Eigen::Index c = 0; c < m.cols(); ++c)
-    for (Eigen::Index r = c; r < m.rows(); ++r)
-      out[k++] = r == c ? m(r, c) : std::numbers::sqrt2 * m(r, c);
-}
-
-Eigen::MatrixXd unpack(const Eigen::VectorXd& packed, Eigen::Index size) {
-  Eigen::MatrixXd out(size, size);
-  Eigen::Index k = 0;
-  for (Eigen::Index c = 0; c < size; ++c)
-    for (Eigen::Index r = c; r < size; ++r, ++k)
-      out(r, c) = out(c, r) = r == c ? packed[k] : packed[k] / std::numbers::sqrt2;
-  return out;
-}
-
-/// M-orthonormal columns of the same span, without those that depend on others.
-void orthonormalize(Eigen::MatrixXd& columns, const Eigen::VectorXd& mass) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> inertia(columns.transpose() *
-                                                               mass.asDiagonal() * columns);
-  const Eigen::VectorXd& values = inertia.eigenvalues();
-  Eigen::Index first = 0;
-  while (first + 1 < values.size() && values[first] < kDependent * values[values.size() - 1])
-    ++first;
-  const Eigen::Index count = values.size() - first;
-  columns = (columns * inertia.eigenvectors().rightCols(count) *
-             values.tail(count).cwiseSqrt().cwiseInverse().asDiagonal())
-                .eval();
-}
-
-/// H(z) and its derivatives between some columns.
-class Reduced {
- public:
-  Reduced(const MetricElements& elements, Eigen::MatrixXd& columns, const Eigen::VectorXd& mass)
-      : elements_(elements), columns_(columns) {
-    orthonormalize(columns, mass);
-    elastic_ = Eigen::MatrixXd::Zero(size(), size());
-    for (const MetricElement& e : elements.all()) {
-      Eigen::VectorXd work = Eigen::VectorXd::Zero(size());
-      for (int a = 0; a < e.node_count; ++a)
-        work.noalias() +=
-            columns.middleRows<3>(3 * e.nodes[a]).transpose() * e.force.segment<3>(3 * a);
-      elastic_.noalias() += work * work.transpose() / e.stiffness;
-    }
-  }
-
-  Eigen::Index size() const { return columns_.cols(); }
-  Eigen::Index packedSize() const { return size() * (size() + 1) / 2; }
-  const Eigen::MatrixXd& elastic() const { return elastic_; }
-  Eigen::MatrixXd hessian(const Eigen::VectorXd& z) const {
-    const Eigen::MatrixXd h = elastic_ + columns_.transpose() * elements_.stiffened(z, columns_);
-    return 0.5 * (h + h.transpose());
-  }
-
-  /// One row an element: scale (columns^T dH/dz columns) scale^T, packed.
-  Eigen::MatrixXd byZ(const Eigen::MatrixXd& scale) const {
-    Eigen::MatrixXd out(elements_.count(), packedSize());
-    const Eigen::MatrixXd scaled = columns_ * scale.transpose();
-    tbb::parallel_for(tbb::blocked_range<int>(0, elements_.count()), [&](const auto& range) {
-      Eigen::MatrixXd local(12, size());
-      for (int i = range.begin(); i < range.end(); ++i) {
-        const MetricElement& e = elements_.all()[i];
-        const int n = 3 * e.node_count;
-        for (int a = 0; a < e.node_count; ++a)
-          local.middleRows<3>(3 * a) = scaled.middleRows<3>(3 * e.nodes[a]);
-        const Eigen::MatrixXd pushed = e.block.topLeftCorner(n, n) * local.topRows(n);
-        pack(local.topRows(n).transpose() * pushed, out.row(i));
-      }
-    });
-    return out;
-  }
-
- private:
-  const MetricElements& elements_;
-  const Eigen::MatrixXd& columns_;
-  Eigen::MatrixXd elastic_;
-};
 
 /// Share of the way on which I + t m stays definite, at most `most`.
 double stepTo(const Eigen::MatrixXd& m, double most) {
@@ -130,7 +48,7 @@ double stepTo(const Eigen::VectorXd& at, const Eigen::VectorXd& step, double mos
 
 Eigen::MatrixXd MetricBarrier::softest(const Eigen::MatrixXd& columns, int count) const {
   Eigen::MatrixXd copy = columns;
-  const Reduced reduced_to(elements_, copy, mass_);
+  const ReducedHessian reduced_to(elements_, copy, mass_);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(reduced_to.hessian(z_));
   return copy * eigen.eigenvectors().leftCols(std::min<Eigen::Index>(count, copy.cols()));
 }
@@ -367,7 +285,7 @@ class MetricBarrier::Stability {
 
   MetricBarrier& b_;
   const Eigen::MatrixXd& columns_;
-  const Reduced reduced_;
+  const ReducedHessian reduced_;
   const Eigen::Index r_;
   const Eigen::MatrixXd identity_;
   Eigen::MatrixXd s_, v_, scale_, inverse_s_, by_z_;

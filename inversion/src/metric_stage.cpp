@@ -15,8 +15,12 @@ namespace {
 constexpr int kMaxRounds = 60;
 /// Soft motions that the search begins with, that a round adds at most, and that it keeps.
 constexpr int kFirstModes = 16, kMoreModes = 10, kKeptModes = 24;
-/// The restricted problem asks for this times the floor.
-constexpr double kOvershoot = 4.0;
+/// The restricted problem asks for this times the floor, or for this share of the elastic Hessian's
+/// smallest eigenvalue if that is more: what is barely stable a breath moves to another shape.
+constexpr double kOvershoot = 4.0, kComfortable = 0.1;
+/// Rounds that are spent on that once something is stable, and what rounding may take of it.
+constexpr int kRoundsForComfort = 6;
+constexpr double kSlack = 0.99;
 /// Modes this far above the lowest one, in its own size, are no danger.
 constexpr double kDangerous = 0.9;
 constexpr int kBisections = 8;
@@ -42,17 +46,23 @@ class Search {
 
   MetricResult run() {
     const std::optional<Eigen::VectorXd> least = leastEnergy();
-    if (least && isStable(*least)) return found(*least, true);
+    if (least && barrier_.inside(*least) && isStable(*least)) return found(*least, true);
     const auto balanced = barrier_.balance({options_.stop});
     if (balanced == MetricBarrier::Outcome::kInfeasible) return proved();
     if (balanced != MetricBarrier::Outcome::kReached) return counted({});
     say("balanced", 0.0);
     if (free_.empty()) return found(barrier_.z(), true);
-    Eigen::MatrixXd columns = modesAt(Eigen::VectorXd::Zero(elements_.count()), kFirstModes).second;
+    const auto elastic = modesAt(Eigen::VectorXd::Zero(elements_.count()), kFirstModes);
+    Eigen::MatrixXd columns = elastic.second;
+    if (columns.cols() == 0) return found(barrier_.z(), false);
+    const double comfortable =
+        std::max(kOvershoot * options_.lambda_floor_per_s2, kComfortable * elastic.first[0]);
+    std::optional<Eigen::VectorXd> best;
+    double best_lambda = options_.lambda_floor_per_s2;
+    int rounds_with_best = 0;
     for (int round = 0; round < kMaxRounds && !stopped(); ++round) {
-      if (columns.cols() == 0 || !affordable(columns.cols())) break;
-      const auto outcome =
-          barrier_.stabilize(columns, kOvershoot * options_.lambda_floor_per_s2, {options_.stop});
+      if (!affordable(columns.cols())) break;
+      const auto outcome = barrier_.stabilize(columns, comfortable, {options_.stop});
       if (outcome == MetricBarrier::Outcome::kInfeasible) return proved();
       say("restricted", barrier_.lambda_per_s2());
       // Neither enough nor provably nothing can be reached.
@@ -63,7 +73,11 @@ class Search {
       const auto [values, vectors] = modesAt(barrier_.z(), kMoreModes);
       if (values.size() == 0) break;
       say("stability", values[0]);
-      if (values[0] >= options_.lambda_floor_per_s2) return found(nearer(least), true);
+      if (values[0] >= best_lambda) {
+        best = barrier_.z();
+        best_lambda = values[0];
+      }
+      if (best && (best_lambda >= comfortable || ++rounds_with_best > kRoundsForComfort)) break;
       Eigen::Index more = 0;
       const double danger = values[0] + kDangerous * std::abs(values[0]);
       while (more < values.size() && values[more] < danger) ++more;
@@ -71,11 +85,12 @@ class Search {
       columns.resize(vectors.rows(), kept.cols() + more);
       columns << kept, vectors.leftCols(more);
     }
-    return found(barrier_.z(), false);
+    if (!best) return found(barrier_.z(), false);
+    return found(nearer(least, *best, std::min(best_lambda, comfortable)), true);
   }
 
  private:
-  /// The state of least elastic energy, if it lies within bounds.
+  /// The state of least elastic energy, within bounds or not.
   std::optional<Eigen::VectorXd> leastEnergy() {
     auto forces = ContactForces::create(shell_, problem_);
     if (!forces) return std::nullopt;
@@ -85,7 +100,6 @@ class Search {
     if (!solved.converged) return std::nullopt;
     Eigen::VectorXd z = elements_.works(solved.motion);
     for (int i = 0; i < elements_.count(); ++i) z[i] /= elements_.all()[i].stiffness;
-    if (!barrier_.inside(z)) return std::nullopt;
     return z;
   }
 
@@ -121,16 +135,16 @@ class Search {
     return values.size() > 0 ? values[0] : -1.0;
   }
 
-  /// As near the state of least energy as stays stable: on the way there H changes linearly, and
+  /// As near the state of least energy as stays as stable: on the way there H changes linearly, and
   /// bounds and cones are convex.
-  Eigen::VectorXd nearer(const std::optional<Eigen::VectorXd>& least) {
-    const Eigen::VectorXd stable = barrier_.z();
+  Eigen::VectorXd nearer(const std::optional<Eigen::VectorXd>& least, const Eigen::VectorXd& stable,
+                         double lambda) {
     if (!least) return stable;
     double good = 1.0, bad = 0.0;
     for (int k = 0; k < kBisections && !stopped(); ++k) {
       const double middle = 0.5 * (good + bad);
-      const bool holds = isStable(*least + middle * (stable - *least));
-      (holds ? good : bad) = middle;
+      const Eigen::VectorXd z = *least + middle * (stable - *least);
+      (barrier_.inside(z) && lambdaAt(z) >= kSlack * lambda ? good : bad) = middle;
     }
     return *least + good * (stable - *least);
   }
