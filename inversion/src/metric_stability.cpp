@@ -178,13 +178,14 @@ class MetricBarrier::Stability {
     by_z_ = reduced_.byZ(scale_);
     by_lambda_.resize(reduced_.packedSize());
     pack(-scale_ * scale_.transpose(), by_lambda_);
-    Eigen::MatrixXd system(by_z_.cols(), by_z_.cols());
+    // Symmetric: blocks on and below the diagonal, of which LDLT reads no more.
+    Eigen::MatrixXd system = Eigen::MatrixXd::Zero(by_z_.cols(), by_z_.cols());
     for (Eigen::Index first = 0; first < system.cols(); first += kColumns) {
       if (stop && stop()) return false;
       const Eigen::Index count = std::min(kColumns, system.cols() - first);
       const Eigen::MatrixXd answers = b_.reduced(by_z_.middleCols(first, count));
       tbb::parallel_for(
-          tbb::blocked_range<Eigen::Index>(0, system.rows(), kColumns),
+          tbb::blocked_range<Eigen::Index>(first, system.rows(), kColumns),
           [&](const auto& range) {
             const auto rows = range.end() - range.begin();
             system.block(range.begin(), first, rows, count).noalias() =
@@ -193,7 +194,7 @@ class MetricBarrier::Stability {
           tbb::simple_partitioner());
     }
     system.diagonal().array() += 1.0;
-    solver_.compute(0.5 * (system + system.transpose()));
+    solver_.compute(system);
     by_lambda_solved_ = solver_.solve(by_lambda_);
     // Of log det S by each z: <S^-1, dS/dz> = <R S^-1 R^T ...>, R^-T S^-1 R^-1 = Sigma^-1.
     Eigen::VectorXd packed(by_lambda_.size());
