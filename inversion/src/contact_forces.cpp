@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "contact_forces.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "free_coordinates.h"
 #include "second_order_cone.h"
 
 namespace tenter {
@@ -42,16 +44,9 @@ Result<ContactForces> ContactForces::create(const InverseShell& shell, const Res
   ContactForces out(system->hessian(system->restState(), Projection::kNone));
   out.contacts_ = problem.contacts();
   out.vertex_weight_N_ = problem.weight_N() / shell.vertexCount();
-  // Free vertices come first among the degrees of freedom, in order.
-  out.first_dof_.assign(static_cast<std::size_t>(shell.vertexCount()), 0);
-  for (const int v : problem.fixed()) out.first_dof_[v] = -1;
-  int next = 0;
-  for (int& dof : out.first_dof_) {
-    if (dof < 0) continue;
-    dof = next;
-    next += 3;
-  }
-  require(next + shell.rotationCount() == out.h_.size, "ContactForces: another order of dofs");
+  out.first_dof_ = firstDofs(shell.vertexCount(), problem.fixed());
+  const auto free = std::ranges::count_if(out.first_dof_, [](int dof) { return dof >= 0; });
+  require(3 * free + shell.rotationCount() == out.h_.size, "ContactForces: another order of dofs");
   return out;
 }
 

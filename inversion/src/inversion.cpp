@@ -254,7 +254,8 @@ class Inverter {
                   : stopped()              ? InversionStatus::kBudget
                                            : InversionStatus::kNotConverged;
     if (out_.status == InversionStatus::kNotConverged) explainFailure();
-    if (out_.softness_proof) out_.status = InversionStatus::kInfeasible;
+    if (out_.softness_proof && out_.status != InversionStatus::kCertified)
+      out_.status = InversionStatus::kInfeasible;
     out_.reason = reason();
     out_.seconds = seconds();
     return out_;

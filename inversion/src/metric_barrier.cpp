@@ -9,6 +9,8 @@
 #include <limits>
 #include <utility>
 
+#include "free_coordinates.h"
+
 namespace tenter {
 namespace {
 
@@ -16,18 +18,6 @@ namespace {
 constexpr double kRegular = 1e-13;
 constexpr int kRefinements = 2;
 constexpr Eigen::Index kColumns = 48;  ///< Of a product that one thread makes.
-
-std::vector<int> firstRows(int vertices, const std::vector<int>& fixed) {
-  std::vector<int> first(static_cast<std::size_t>(vertices), 0);
-  for (const int v : fixed) first[v] = -1;
-  int next = 0;
-  for (int& row : first) {
-    if (row < 0) continue;
-    row = next;
-    next += 3;
-  }
-  return first;
-}
 
 int slotOf(const SparseLower& m, int row, int column) {
   const auto begin = m.row.begin() + m.column_begin[column];
@@ -57,7 +47,7 @@ MetricBarrier::MetricBarrier(const InverseShell& shell, const MetricElements& el
       elements_(elements),
       fixed_(std::move(fixed)),
       contacts_(std::move(contacts)),
-      first_row_(firstRows(shell.vertexCount(), fixed_)),
+      first_row_(firstDofs(shell.vertexCount(), fixed_)),
       normal_(patternOf(shell, fixed_)),
       cholesky_(normal_),
       lower_(bounds(elements, &MetricElement::lower)),
@@ -257,14 +247,27 @@ double MetricBarrier::longest(const Step& step) const {
   return t;
 }
 
+/// A share of a step that lowers the barrier and a linear objective, of that slope, as predicted.
+double MetricBarrier::acceptable(const Step& step, double slope, double decrement) const {
+  const double here = barrier(z_, f_);
+  double t = longest(step);
+  while (t > kLeastBarrierStep && !(t * slope + barrier(z_ + t * step.z, f_ + t * step.f) <=
+                                    here - kSufficientDecrease * t * decrement * decrement))
+    t *= kShorterStep;
+  return t;
+}
+
+/// Positive inside { y : y_N >= mu |y_T| }, the motions against which no force of a cone works.
+double MetricBarrier::dualRoom(const Contact& c, const Vec3& y) {
+  const double normal = y.dot(c.normal);
+  return normal - c.friction * (y - normal * c.normal).norm();
+}
+
 /// Whether no force of a cone does negative work along the motion of -nu.
 bool MetricBarrier::coneHolds(const Eigen::VectorXd& nu) const {
-  for (const Contact& c : contacts_) {
-    const Vec3 y = -nu.segment<3>(rowOf(c.vertex));
-    const double normal = y.dot(c.normal);
-    if (normal < c.friction * (y - normal * c.normal).norm()) return false;
-  }
-  return true;
+  return std::ranges::all_of(contacts_, [&](const Contact& c) {
+    return dualRoom(c, -nu.segment<3>(rowOf(c.vertex))) >= 0.0;
+  });
 }
 
 void MetricBarrier::set(const Eigen::VectorXd& z) {
@@ -326,11 +329,7 @@ MetricBarrier::Outcome MetricBarrier::centre(const Limits& limits) {
     const Step step = newton(slope_z_, slope_f_, residual(z_, f_));
     const double decrement =
         std::sqrt(std::max(0.0, -(slope_z_.dot(step.z) + slope_f_.dot(step.f))));
-    const double here = barrier(z_, f_);
-    double t = longest(step);
-    while (t > kLeastBarrierStep && barrier(z_ + t * step.z, f_ + t * step.f) >
-                                        here - kSufficientDecrease * t * decrement * decrement)
-      t *= kShorterStep;
+    const double t = acceptable(step, 0.0, decrement);
     if (t <= kLeastBarrierStep) break;
     z_ += t * step.z;
     f_ += t * step.f;
@@ -373,13 +372,7 @@ MetricBarrier::Outcome MetricBarrier::balance(const Limits& limits) {
     if (provedEnough()) return Outcome::kInfeasible;
     const double decrement =
         std::sqrt(std::max(0.0, -(slope_z_.dot(step.z) + slope_f_.dot(step.f) + push * change)));
-    double t = longest(step);
-    const double here = push * left + barrier(z_, f_);
-    while (t > kLeastBarrierStep) {
-      const double there = push * (left + t * change) + barrier(z_ + t * step.z, f_ + t * step.f);
-      if (there <= here - kSufficientDecrease * t * decrement * decrement) break;
-      t *= kShorterStep;
-    }
+    double t = acceptable(step, push * change, decrement);
     if (t <= kLeastBarrierStep) break;
     const bool reached = left + t * change <= 0.0;
     if (reached) t = left / -change;

@@ -78,6 +78,8 @@ class MetricBarrier {
   double barrier(const Eigen::VectorXd& z, const Eigen::VectorXd& f) const;
   double coneValue(const Vec3& f, std::size_t contact) const;
   double longest(const Step& step) const;
+  double acceptable(const Step& step, double slope, double decrement) const;
+  static double dualRoom(const Contact& contact, const Vec3& motion);
   bool coneHolds(const Eigen::VectorXd& nu) const;
   double slackOf(const Eigen::VectorXd& c) const;
   Eigen::VectorXd forcesOf(const Eigen::VectorXd& z) const;

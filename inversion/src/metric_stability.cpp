@@ -245,12 +245,6 @@ class MetricBarrier::Stability {
     return {primal, dual};
   }
 
-  /// Positive inside { y : y_N >= mu |y_T| }.
-  static double dualRoom(const Contact& c, const Vec3& y) {
-    const double normal = y.dot(c.normal);
-    return normal - c.friction * (y - normal * c.normal).norm();
-  }
-
   void move(const Direction& way, double primal, double dual) {
     b_.z_ += primal * way.step.z;
     b_.f_ += primal * way.step.f;

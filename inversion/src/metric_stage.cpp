@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "contact_forces.h"
+#include "free_coordinates.h"
 #include "metric_barrier.h"
 #include "soft_modes.h"
 
@@ -38,10 +39,7 @@ class Search {
         barrier_(shell, elements, problem.fixed(), problem.contacts()),
         held_(problem.fixed()) {
     for (const Contact& c : problem.contacts()) held_.push_back(c.vertex);
-    std::vector<char> is_held(static_cast<std::size_t>(shell.vertexCount()), 0);
-    for (const int v : held_) is_held[v] = 1;
-    for (int v = 0; v < shell.vertexCount(); ++v)
-      for (int a = 0; a < 3 && !is_held[v]; ++a) free_.push_back(3 * v + a);
+    free_ = freeCoordinates(shell.vertexCount(), held_);
   }
 
   MetricResult run() {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "contact_search.h"
+#include "free_coordinates.h"
 #include "friction_step.h"
 #include "tenter/mechanics/equilibrium.h"
 
@@ -42,18 +43,6 @@ Result<Eigen::VectorXd> settledRotations(const InverseShell& shell, const ShellS
   options.force_tolerance_N = 1e-2 * kTolerance * shell.weight_N(start.rest) / shell.vertexCount();
   EquilibriumSolver(*system).solve(state, options);
   return Eigen::VectorXd(state.q.tail(shell.rotationCount()));
-}
-
-std::vector<int> firstDofs(int vertices, const std::vector<int>& fixed) {
-  std::vector<int> first(static_cast<std::size_t>(vertices), 0);
-  for (const int v : fixed) first[static_cast<std::size_t>(v)] = -1;
-  int next = 0;
-  for (int& dof : first) {
-    if (dof < 0) continue;
-    dof = next;
-    next += 3;
-  }
-  return first;
 }
 
 }  // namespace

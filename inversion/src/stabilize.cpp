@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "free_coordinates.h"
 #include "soft_modes.h"
 
 namespace tenter {
@@ -35,10 +36,7 @@ class Stabilizer {
       : shell_(shell), problem_(problem), options_(options), size_(sizeOf(problem.pose())) {
     held_ = problem.fixed();
     for (const Contact& c : problem.contacts()) held_.push_back(c.vertex);
-    std::vector<char> is_held(static_cast<std::size_t>(shell.vertexCount()), 0);
-    for (const int v : held_) is_held[v] = 1;
-    for (int v = 0; v < shell.vertexCount(); ++v)
-      for (int a = 0; a < 3 && !is_held[v]; ++a) free_.push_back(3 * v + a);
+    free_ = freeCoordinates(shell.vertexCount(), held_);
     for (int r = 0; r < shell.rotationCount(); ++r) free_.push_back(3 * shell.vertexCount() + r);
   }
 
