@@ -47,6 +47,8 @@ std::string amiss(const Json& status) {
   return text.empty() ? text : ": " + text;
 }
 
+std::uint64_t numberOf(const Json& last) { return last.value("number", std::uint64_t{0}); }
+
 bool sessionClosed(const Json& status) {
   return status.value("session", Json::object()).value("closed", false);
 }
@@ -122,19 +124,22 @@ Result<int> RigVisit::run(const RigRun& run) {
   if (interrupted()) {
     return Error{ErrorKind::kInterlock, "", "", "stopped before the protocol began", ""};
   }
-  const auto started =
-      call("run", {{"protocol", run.protocol_text},
-                   {"session", std::filesystem::absolute(run.session).lexically_normal().string()},
-                   {"fabric", run.fabric},
-                   {"specimen", run.specimen},
-                   {"who", run.who},
-                   {"operator", run.operator_name},
-                   {"areal_density_kg_per_m2", run.areal_density_kg_per_m2},
-                   {"skip_mapping_check", run.skip_mapping_check}});
-  if (!started) return started.error();
+  Json asked{{"protocol", run.protocol_text},
+             {"session", std::filesystem::absolute(run.session).lexically_normal().string()},
+             {"fabric", run.fabric},
+             {"specimen", run.specimen},
+             {"who", run.who},
+             {"operator", run.operator_name},
+             {"areal_density_kg_per_m2", run.areal_density_kg_per_m2},
+             {"skip_mapping_check", run.skip_mapping_check}};
+  if (run.temperature_degC) asked["temperature_degC"] = *run.temperature_degC;
+  if (run.relative_humidity) asked["relative_humidity"] = *run.relative_humidity;
+  const auto before = call("status");
+  if (!before) return before.error();
+  if (const auto started = call("run", asked); !started) return started.error();
   auto status = wait(run.protocol_name);
   if (!status) return status.error();
-  constexpr int kPatience = 25;
+  constexpr int kPatience = 150;
   for (int i = 0; i < kPatience && !sessionClosed(*status); ++i) {
     std::this_thread::sleep_for(kPoll);
     status = call("status");
@@ -143,8 +148,12 @@ Result<int> RigVisit::run(const RigRun& run) {
   console_.answer["session"] = run.session;
   const std::string fault = status->value("session", Json::object()).value("fault", "");
   if (!fault.empty()) return Error{ErrorKind::kHardware, run.session, "", fault, ""};
+  if (!sessionClosed(*status)) {
+    return Error{ErrorKind::kHardware, run.session, "", "is still open: the disk does not keep up",
+                 "see `tenter rig status`; `tenter session verify` tells what is in it"};
+  }
   if (status->value("reason", "") == "rig: mapping") tellMapping(*status, false);
-  return ended(Json::object(), *status);
+  return ended(*before, *status);
 }
 
 void RigVisit::tellMapping(const Json& status, bool all) {
@@ -162,6 +171,20 @@ Result<int> RigVisit::ended(const Json& before, const Json& status) {
   const std::string reason = status.value("reason", "");
   console_.answer["state"] = state;
   console_.answer["reason"] = reason;
+  const Json last = status.value("last", Json::object());
+  const bool took_time =
+      last != Json::object() && numberOf(last) != numberOf(before.value("last", Json::object()));
+  if (took_time) {
+    const std::string how = last.value("how", "");
+    console_.answer["how"] = how;
+    if (how != "done") {
+      const std::string why = last.value("why", "");
+      console_.warn(last.value("what", "") + ": " + how +
+                    (why.empty() || why == how ? "" : ": " + why));
+    }
+    console_.say("the rig is " + state + (reason.empty() ? "" : " (" + reason + ")"));
+    return how == "done" && !interrupted() ? kDone : kInterlock;
+  }
   console_.say("the rig is " + state + (reason.empty() ? "" : " (" + reason + ")"));
   const bool as_before = before.value("state", "") == state && before.value("reason", "") == reason;
   const bool halted = (state == "fault" || state == "stopped") && !as_before;

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "command.h"
@@ -17,6 +18,7 @@ struct RigRun {
   std::string session;  ///< Folder to be made.
   std::string fabric, specimen, who, operator_name;
   double areal_density_kg_per_m2 = 0.0;
+  std::optional<double> temperature_degC, relative_humidity;
   bool skip_mapping_check = false;  ///< The session says so.
 };
 
@@ -37,8 +39,8 @@ class RigVisit {
   Result<int> run(const RigRun& run);
   /// Which cell each axis that was tried has pulled, for the answer and for a person.
   void tellMapping(const nlohmann::json& status, bool all);
-  /// Says what the visit ended in: exit 7 if a limit or a person ended the motion, not if the rig
-  /// is as halted as it was before.
+  /// Says what the visit ended in: exit 7 unless what was asked for was done; of what takes no
+  /// time, unless the rig is no more halted than before.
   Result<int> ended(const nlohmann::json& before, const nlohmann::json& status);
 
  private:

@@ -191,9 +191,16 @@ Result<int> runProtocol(const SessionCapture& capture, const std::string& protoc
   if (!visit) return visit.error();
   const std::uint64_t piece =
       capture.mount.specimen != 0 ? capture.mount.specimen : capture.mount.seed;
-  return (*visit)->run({protocol, capture.mount.protocol, capture.output, capture.mount.fabric,
-                        capture.mount.fabric + "/" + std::to_string(piece), "virtual rig",
-                        "tenter twin capture", (*fabric)->areal_density_kg_per_m2});
+  RigRun run;
+  run.protocol_text = protocol;
+  run.protocol_name = capture.mount.protocol;
+  run.session = capture.output;
+  run.fabric = capture.mount.fabric;
+  run.specimen = capture.mount.fabric + "/" + std::to_string(piece);
+  run.who = "virtual rig";
+  run.operator_name = "tenter twin capture";
+  run.areal_density_kg_per_m2 = (*fabric)->areal_density_kg_per_m2;
+  return (*visit)->run(run);
 }
 
 }  // namespace

@@ -27,11 +27,12 @@ constexpr double kLeastBudget_s = 1e-3;
 constexpr double kSolving = 0.95;
 
 struct Options {
-  std::string target, output, warp, method = "direct", rest = "mesh", gravity;
+  std::string target, output, warp, method = "direct", rest = "mesh", prefer = "none", gravity;
   MeasuredTargetOptions measured;
   MaterialOptions material;
   std::vector<std::string> obstacles, fix;
   double friction = 0.4, contact_distance_mm = 0.0, time_budget_s = 0.0;
+  double prefer_share = 1.0, smooth_mm = 0.0;
   bool range = false;
 };
 
@@ -84,6 +85,21 @@ void declare(CLI::App& command, Options& o) {
                   "every edge, which need not fit together (--k-stretch and --k-bend only)")
       ->check(CLI::IsMember({"mesh", "metric"}))
       ->capture_default_str();
+  command
+      .add_option("--prefer", o.prefer,
+                  "What the rest shape is to be like where contacts leave a choice: flat: without "
+                  "bends; smooth: without the target's short folds; none: near the target")
+      ->check(CLI::IsMember({"none", "flat", "smooth"}))
+      ->capture_default_str();
+  command
+      .add_option("--prefer-share", o.prefer_share,
+                  "Of that, 0 to 1; halved until a certified rest shape is found")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      .add_option("--smooth-mm", o.smooth_mm,
+                  "Of smooth: folds shorter than 2 pi times this go; 0: 3 % of the target's size")
+      ->check(CLI::NonNegativeNumber);
   command.add_flag("--range", o.range,
                    "Find the multiples of stiffness and friction that have a certified rest shape");
   command.add_option("-o,--output", o.output, "Folder to write")->required();
@@ -174,6 +190,9 @@ nlohmann::json provenanceOf(const Options& o) {
           {"warp", o.warp},
           {"method", o.method},
           {"rest", o.rest},
+          {"prefer", o.prefer},
+          {"prefer_share", o.prefer_share},
+          {"smooth_mm", o.smooth_mm},
           {"time_budget_s", o.time_budget_s}};
 }
 
@@ -181,11 +200,27 @@ void tell(const Options& o, const InversionProblem& problem, const InversionResu
           const FeasibleRange* range, Console& console) {
   const auto certificate = certificateToJson(problem, r, nullptr, range);
   console.answer = {{"contacts", problem.contacts.size()}, {"folder", o.output}};
-  for (const char* key :
-       {"status", "reason", "force_residual_rel", "force_rounding_rel", "cone_violations",
-        "cone_margin_min", "lambda_min_per_s2", "negative_eigenvalues", "redrape_max_rel",
-        "seconds", "solve_cpu_seconds", "forces_cpu_seconds", "factorizations", "stretch_max",
-        "bend_max_rad", "load_balanced", "proof", "range"}) {
+  for (const char* key : {"status",
+                          "reason",
+                          "force_residual_rel",
+                          "force_rounding_rel",
+                          "cone_violations",
+                          "cone_margin_min",
+                          "lambda_min_per_s2",
+                          "negative_eigenvalues",
+                          "redrape_max_rel",
+                          "seconds",
+                          "solve_cpu_seconds",
+                          "forces_cpu_seconds",
+                          "factorizations",
+                          "stretch_max",
+                          "bend_max_rad",
+                          "load_balanced",
+                          "preference",
+                          "target_shape",
+                          "rest_shape",
+                          "proof",
+                          "range"}) {
     if (certificate.contains(key)) console.answer[key] = certificate.at(key);
   }
   const Certificate& c = r.certificate;
@@ -231,9 +266,19 @@ Result<int> finish(const Options& o, const InversionProblem& problem, const Inve
   return static_cast<int>(ErrorKind::kNotConverged);
 }
 
+RestPreference preferenceOf(const Options& o) {
+  RestPreference out{.share = o.prefer_share, .smoothing_length_m = 1e-3 * o.smooth_mm};
+  if (o.prefer == "flat") out.kind = RestShapeKind::kFlat;
+  if (o.prefer == "smooth") out.kind = RestShapeKind::kSmooth;
+  return out;
+}
+
 Result<int> run(const Options& o, Console& console) {
   const auto start = std::chrono::steady_clock::now();
   if (auto free = checkOutputFolder(o.output, inversionFolder()); !free) return free.error();
+  if (o.prefer != "none" && o.method == "reference")
+    return usageError("--method reference has no preference for a rest shape",
+                      "leave --prefer away");
   if (o.rest == "metric" && o.method == "reference")
     return usageError("--method reference finds rest meshes only", "leave --rest metric away");
   auto problem = problemOf(o, console);
@@ -246,6 +291,7 @@ Result<int> run(const Options& o, Console& console) {
   options.cancelled = interrupted;
   if (o.method == "reference") options.method = InversionMethod::kReference;
   if (o.rest == "metric") options.rest = RestKind::kMetric;
+  options.preference = preferenceOf(o);
   std::optional<Progress> progress(std::in_place, console);
   options.progress = [&progress](const std::string& stage) {
     spdlog::info("{}", stage);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
 #include <cstdio>
+#include <optional>
 
 #include "protocol_files.h"
 #include "rig_snap.h"
@@ -22,6 +23,7 @@ struct Options {
   std::string protocol, output, fabric = "unknown", specimen = "unknown", who = "unknown",
                                 operator_name = "unknown";
   double areal_density_kg_per_m2 = 0.2;
+  std::optional<double> temperature_degC, humidity_percent;
   bool skip_mapping_check = false;
   std::vector<std::string> axes;
 };
@@ -46,6 +48,10 @@ void declareRun(CLI::App& command, Options& o) {
   command.add_option("--who", o.who, "Whom the data belong to")->capture_default_str();
   command.add_option("--operator", o.operator_name, "Who is at the bench")->capture_default_str();
   command.add_option("--areal-density", o.areal_density_kg_per_m2, "kg/m2")->capture_default_str();
+  command.add_option("--temperature", o.temperature_degC, "Of the air, degrees Celsius")
+      ->check(CLI::Range(-50.0, 100.0));
+  command.add_option("--humidity", o.humidity_percent, "Relative, of the air, per cent")
+      ->check(CLI::Range(0.0, 100.0));
   command.add_flag("--skip-mapping-check", o.skip_mapping_check,
                    "Begin without having seen that each axis pulls its own cell; it is recorded");
 }
@@ -62,6 +68,16 @@ std::string numberText(const Json& value, const char* unit) {
   return text;
 }
 
+std::string emergencyText(const Json& status) {
+  std::string blind;
+  for (const Json& axis : status.value("axes", Json::array())) {
+    if (!axis.value("kill_switch", false))
+      blind += (blind.empty() ? "" : ", ") + axis.value("name", "");
+  }
+  const std::string pressed = status.value("emergency_stop", false) ? "pressed" : "not pressed";
+  return blind.empty() ? pressed : pressed + "; not seen by " + blind;
+}
+
 Result<int> status(const Options& o, Console& console) {
   const auto client = RigClient::connect(o.socket->as<std::string>());
   if (!client) return client.error();
@@ -69,6 +85,7 @@ Result<int> status(const Options& o, Console& console) {
   if (!answer) return answer.error();
   console.answer = *answer;
   const std::string reason = answer->value("reason", "");
+  console.say("emergency stop: " + emergencyText(*answer));
   console.say(answer->value("rig", "") + ": " + answer->value("state", "") +
               (reason.empty() ? "" : " (" + reason + ")"));
   for (const Json& axis : answer->value("axes", Json::array())) {
@@ -140,8 +157,19 @@ Result<int> run(const Options& o, Console& console) {
   if (!text) return text.error();
   const auto visit = RigVisit::begin(o.socket->as<std::string>(), console);
   if (!visit) return visit.error();
-  return (*visit)->run({*text, o.protocol, o.output, o.fabric, o.specimen, o.who, o.operator_name,
-                        o.areal_density_kg_per_m2, o.skip_mapping_check});
+  RigRun run{*text,
+             o.protocol,
+             o.output,
+             o.fabric,
+             o.specimen,
+             o.who,
+             o.operator_name,
+             o.areal_density_kg_per_m2,
+             o.temperature_degC,
+             {},
+             o.skip_mapping_check};
+  if (o.humidity_percent) run.relative_humidity = 0.01 * *o.humidity_percent;
+  return (*visit)->run(run);
 }
 
 Result<int> checkMapping(const Options& o, Console& console) {

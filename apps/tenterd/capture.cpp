@@ -2,8 +2,9 @@
 #include "capture.h"
 
 #include <sched.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
+
+#include "daemon_log.h"
 
 namespace tenter::daemon {
 namespace {
@@ -48,7 +49,8 @@ void CaptureService::request(std::int64_t index, const std::shared_ptr<Recorder>
     recorder->append(
         steadyNow_ns(),
         FaultEvent{"cameras", "late", "capture " + std::to_string(index) + " was left out"});
-    spdlog::warn("cameras: late, capture {} was left out", index);
+    logEvent(LogLevel::kWarning, "fault",
+             {{"source", "cameras"}, {"fault", "late"}, {"capture", index}});
     return;
   }
   wanted_ = Wanted{index, recorder, recorder->expectFrames()};
@@ -100,7 +102,8 @@ void CaptureService::record(const FrameSet& set, const Wanted& wanted) {
     const std::string text =
         "capture " + std::to_string(wanted.index) + ", take " + std::to_string(event.attempt + 1) +
         ": " + (event.detail.empty() ? std::string(frameFaultText(event.fault)) : event.detail);
-    spdlog::warn("{}: {} {}", name, frameFaultName(event.fault), text);
+    logEvent(LogLevel::kWarning, "fault",
+             {{"source", name}, {"fault", frameFaultName(event.fault)}, {"text", text}});
     recorder.append(set.done_ns, FaultEvent{name, std::string(frameFaultName(event.fault)), text});
   }
   recorder.append(

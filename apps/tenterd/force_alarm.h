@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <mutex>
 
@@ -17,7 +18,8 @@ class ForceAlarm {
 
   bool beyond(const LoadCellReading& reading, std::int64_t now_ns) const {
     const auto gross_N = reading.gross_N(now_ns);
-    return gross_N ? *gross_N > absolute_N_ : reading.faultAt(now_ns) == LoadCellFault::kOverRange;
+    return gross_N ? std::abs(*gross_N) > absolute_N_
+                   : reading.faultAt(now_ns) == LoadCellFault::kOverRange;
   }
 
   void look(const LoadCellReading& reading) {

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // tenterd: drives one rig and serves it on a Unix socket.
-#include <spdlog/sinks/stdout_sinks.h>
-#include <spdlog/spdlog.h>
 #include <sys/prctl.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
@@ -10,6 +8,7 @@
 #include <csignal>
 #include <cstdio>
 
+#include "daemon_log.h"
 #include "socket_server.h"
 
 namespace tenter::daemon {
@@ -33,7 +32,7 @@ int serve(const std::string& config_file, const std::string& socket, const std::
   Rpc rpc(**service);
   auto server = SocketServer::listen(socket, group, rpc);
   if (!server) return fail(server.error());
-  spdlog::info("serving {} on {}", (*service)->config().name, socket);
+  logEvent(LogLevel::kInfo, "serving", {{"rig", (*service)->config().name}, {"socket", socket}});
   sd_notify(0, "READY=1");
   int ticks = 0;
   (*service)->loop([&] {
@@ -42,7 +41,7 @@ int serve(const std::string& config_file, const std::string& socket, const std::
     if (g_quit != 0) (*service)->quit();
   });
   sd_notify(0, "STOPPING=1");
-  spdlog::info("ended");
+  logEvent(LogLevel::kInfo, "ended", nlohmann::json::object());
   return 0;
 }
 
@@ -61,21 +60,22 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(ErrorKind::kUsage);
   }
-  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
-      "tenterd", std::make_shared<spdlog::sinks::stderr_sink_mt>()));
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
-  spdlog::flush_on(spdlog::level::info);
+  startLog();
   struct sigaction action {};
   action.sa_handler = onSignal;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGHUP, &action, nullptr);  // its terminal is gone
+  std::signal(SIGPIPE, SIG_IGN);        // whoever read its log is
   if (with_parent) {
     setpgid(0, 0);
     prctl(PR_SET_PDEATHSIG, SIGTERM);
   }
   // A file that may not grow is a disk that is full: the write says so, and the rig unloads.
   std::signal(SIGXFSZ, SIG_IGN);
-  return serve(config, socket, group);
+  const int code = serve(config, socket, group);
+  endLog();
+  return code;
 }
 
 }  // namespace

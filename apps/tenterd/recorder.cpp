@@ -10,6 +10,8 @@ namespace {
 
 /// A disk that is so far behind will not catch up; 200 s of samples.
 constexpr std::size_t kLongestQueue = 10'000;
+/// A disk that takes so long over what it was given does not answer.
+constexpr std::int64_t kLongestWrite_ns = 5'000'000'000;
 
 }  // namespace
 
@@ -63,6 +65,8 @@ bool Recorder::closed() const {
 
 std::string Recorder::fault() const {
   const std::lock_guard lock(mutex_);
+  if (fault_.empty() && writing_since_ns_ && monotonic_ns() - *writing_since_ns_ > kLongestWrite_ns)
+    return writer_->folder().string() + ": the disk does not answer";
   return fault_;
 }
 
@@ -91,11 +95,17 @@ void Recorder::write() {
       changed_.wait(lock, [&] { return !queue_.empty() || ends(); });
       items.swap(queue_);
       last = ends();
+      writing_since_ns_ = monotonic_ns();
     }
     take(std::move(items));
-    if (!last) continue;
+    if (!last) {
+      const std::lock_guard lock(mutex_);
+      writing_since_ns_.reset();
+      continue;
+    }
     const Result<void> done = writer_->close(close_ns_);
     const std::lock_guard lock(mutex_);
+    writing_since_ns_.reset();
     if (!done && fault_.empty()) fault_ = done.error().message();
     closed_ = true;
     return;

@@ -6,6 +6,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -55,6 +56,7 @@ class Recorder {
   int expected_ = 0;  ///< Frames that are to come.
   bool closed_ = false;
   std::string fault_;
+  std::optional<std::int64_t> writing_since_ns_;  ///< What is being written now.
   std::thread thread_;
 };
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "rig_service.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "daemon_log.h"
 
 namespace tenter::daemon {
 namespace {
@@ -16,7 +16,8 @@ constexpr auto kTick = 20ms;
 constexpr auto kWatchPeriod = 2ms;
 constexpr Actuator::Timeout kDeviceTimeout{40}, kEnergiseTimeout{100}, kConnectTimeout{500};
 constexpr auto kAnswerLimit = 2s;
-constexpr auto kQuitLimit = 30s;
+/// Longer than any unloading takes.
+constexpr auto kQuitLimit = 150s;
 constexpr double kSameSpeedShare = 0.02;
 constexpr std::int64_t kReconnectPeriod_ns = 1'000'000'000;
 
@@ -39,9 +40,10 @@ auto RigService::timed(const char* name, Actuator::Timeout timeout, Call call) {
   const auto taken = std::chrono::steady_clock::now() - start;
   if (taken > 2 * timeout) {
     ++overlong_;
-    spdlog::warn("{}: took {} ms of {} ms", name,
-                 std::chrono::duration_cast<std::chrono::milliseconds>(taken).count(),
-                 timeout.count());
+    logEvent(LogLevel::kWarning, "overlong-call",
+             {{"call", name},
+              {"taken_ms", std::chrono::duration_cast<std::chrono::milliseconds>(taken).count()},
+              {"timeout_ms", timeout.count()}});
   }
   return outcome;
 }
@@ -85,6 +87,7 @@ RigService::RigService(RigConfig config, ActuatorBank bank, std::shared_ptr<Cell
 
 RigService::~RigService() {
   quitting_ = true;
+  armed_ = false;
   watch_.join();
 }
 
@@ -126,6 +129,7 @@ std::vector<AxisOutcome> RigService::haltEverything() {
 }
 
 Result<void> RigService::command(RigCommand command, std::shared_ptr<Recorder> recorder) {
+  if (quitting_) return Error{ErrorKind::kInterlock, "", "", "tenterd is about to end", ""};
   std::unique_lock lock(command_mutex_);
   const std::uint64_t id = command.id = ++last_command_;
   waiting_[id].recorder = std::move(recorder);
@@ -150,11 +154,20 @@ void RigService::loop(const std::function<void()>& each_tick) {
     const auto now = std::chrono::steady_clock::now();
     noteLateness((now - next).count(), monotonic_ns());
     next = now - next > kTick ? now + kTick : next + kTick;
-    tick();
+    try {
+      tick();
+    } catch (...) {
+      armed_ = false;
+      (void)haltEverything();
+      throw;
+    }
     each_tick();
     if (!quitting_) continue;
     if (!quit_at) quit_at = now;
-    if (!machine_.moving() || now - *quit_at > kQuitLimit) break;
+    if (!machine_.busy()) break;
+    if (now - *quit_at <= kQuitLimit) continue;
+    noteFault("daemon", "not-unloaded", "ended before all cords were slack");
+    break;
   }
   armed_ = false;
   (void)haltEverything();
@@ -167,7 +180,7 @@ void RigService::noteLateness(std::int64_t late_ns, std::int64_t now_ns) {
   if (late_ns <= std::chrono::nanoseconds(kTick).count()) return;
   ++missed_;
   const std::string text = std::to_string(late_ns / 1000) + " us late";
-  spdlog::warn("loop: missed deadline, {}", text);
+  logEvent(LogLevel::kWarning, "missed-deadline", {{"text", text}});
   if (recorder_) recorder_->append(now_ns, FaultEvent{"loop", "missed-deadline", text});
 }
 
@@ -196,7 +209,7 @@ void RigService::tick() {
 void RigService::reconnect() {
   const std::int64_t now_ns = monotonic_ns();
   const unsigned arrivals = bank_.arrivals();
-  if (machine_.moving() || (arrivals == arrivals_ && now_ns < next_reconnect_ns_)) return;
+  if (machine_.busy() || (arrivals == arrivals_ && now_ns < next_reconnect_ns_)) return;
   bool missing = false;
   for (int i = 0; i < bank_.size(); ++i) missing = missing || !bank_.axis(i).connected();
   arrivals_ = arrivals;
@@ -259,7 +272,8 @@ std::vector<RigCommand> RigService::takeCommands() {
     const std::lock_guard lock(command_mutex_);
     commands.swap(commands_);
   }
-  if (quitting_ && machine_.running()) {
+  // Whatever is under way, paused or not, is ended and lets the cords out; a tare just ends.
+  if (quitting_ && machine_.busy() && !machine_.unloading()) {
     RigCommand abort;
     abort.kind = Kind::kAbort;
     commands.push_back(abort);
@@ -275,7 +289,11 @@ void RigService::release() {
 }
 
 void RigService::obey(const RigOrders& orders) {
-  if (orders.halt || (halt_again_ && !orders.release_halt)) return note(haltEverything());
+  if (orders.halt || (halt_again_ && !orders.release_halt)) {
+    note(haltEverything());
+    if (orders.deenergise) note(bank_.deenergiseAll(kEnergiseTimeout));
+    return;
+  }
   if (orders.deenergise) note(bank_.deenergiseAll(kEnergiseTimeout));
   if (orders.release_halt) release();
   for (int i = 0; i < bank_.size(); ++i) {
@@ -348,7 +366,7 @@ void RigService::noteFault(const std::string& source, const std::string& fault,
                            const std::string& text) {
   const std::int64_t now_ns = monotonic_ns();
   if (!named_.isNews(source, fault, now_ns)) return;
-  spdlog::warn("device: {}: {} {}", source, fault, text);
+  logEvent(LogLevel::kWarning, "device", {{"source", source}, {"fault", fault}, {"text", text}});
   if (recorder_) recorder_->append(now_ns, FaultEvent{source, fault, text});
 }
 
@@ -370,11 +388,15 @@ void RigService::attach(const RigOrders& orders, const RigMemory& before) {
 void RigService::record(const RigTick& tick, const RigOrders& orders) {
   for (const RecordBody& body : orders.records) {
     if (const auto* state = std::get_if<StateChange>(&body)) {
-      spdlog::info("state: {} -> {} ({})", state->from, state->to, state->reason);
+      logEvent(LogLevel::kInfo, "state",
+               {{"from", state->from}, {"to", state->to}, {"reason", state->reason}});
     } else if (const auto* fault = std::get_if<FaultEvent>(&body)) {
-      spdlog::warn("fault: {}: {} {}", fault->source, fault->fault, fault->text);
+      logEvent(LogLevel::kWarning, "fault",
+               {{"source", fault->source}, {"fault", fault->fault}, {"text", fault->text}});
     } else if (const auto* decision = std::get_if<Decision>(&body)) {
-      spdlog::info("decision: {} {}", decision->name, decision->data);
+      logEvent(LogLevel::kInfo, "decision",
+               {{"name", decision->name},
+                {"data", nlohmann::json::parse(decision->data, nullptr, false)}});
     }
   }
   if (!recorder_) return;
@@ -405,10 +427,16 @@ void RigService::answer(const RigOrders& orders) {
 }
 
 void RigService::publish(const RigTick& tick) {
+  const RigPurpose& purpose = machine_.purpose();
   nlohmann::json status{{"rig", config_.name},
                         {"state", rigStateName(machine_.state())},
                         {"reason", machine_.reason()},
                         {"moving", machine_.moving()},
+                        {"last",
+                         {{"number", purpose.number},
+                          {"what", purpose.what},
+                          {"how", purpose.how},
+                          {"why", purpose.why}}},
                         {"emergency_stop", tick.emergency_stop},
                         {"recording", recorder_ != nullptr},
                         {"axes", nlohmann::json::array()},
@@ -419,6 +447,7 @@ void RigService::publish(const RigTick& tick) {
                               {"position_m", numberOrNull(axis.position_m)},
                               {"energised", axis.energised},
                               {"homed", axis.position_certain},
+                              {"kill_switch", config_.axes[i].device.kill_switch},
                               {"fault", axis.fault}});
   }
   for (std::size_t i = 0; i < tick.cells.size(); ++i) {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "rpc.h"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <array>
 #include <filesystem>
 
+#include "daemon_log.h"
 #include "tenter/core/json_reader.h"
 #include "tenter/rig/load_cell.h"
 
@@ -61,6 +60,10 @@ SessionHeader headerFrom(JsonReader& in, const CaptureProtocol& protocol, const 
   header.fabric = in.text("fabric", kMaxText);
   header.specimen = in.text("specimen", kMaxText);
   header.areal_density_kg_per_m2 = in.number("areal_density_kg_per_m2", Range::positive(100.0));
+  if (in.has("temperature_degC"))
+    header.temperature_degC = in.number("temperature_degC", Range::between(-50.0, 100.0));
+  if (in.has("relative_humidity"))
+    header.relative_humidity = in.number("relative_humidity", Range::between(0.0, 1.0));
   header.protocol = protocol.name;
   header.protocol_text = protocol.text;
   header.rig_configuration = rig.text;
@@ -111,8 +114,12 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
   const std::int64_t now_ns = monotonic_ns();
   if (method == "stop") {
     service_.stopNow();
-    spdlog::warn("stop by {}", client.user);
+    logEvent(LogLevel::kWarning, "stop", {{"user", client.user}});
     return Json{{"halted", true}};
+  }
+  if (client.only_stops) {
+    return Error{ErrorKind::kInterlock, "", "", "too many clients: this one may only stop the rig",
+                 "end other programs that talk to tenterd"};
   }
   if (method == "status") return status();
   if (method == "frames") return frames(attached);
@@ -142,7 +149,7 @@ Result<Json> Rpc::dispatch(const std::string& method, const Json& params, const 
     return Error{ErrorKind::kInterlock, "", "", "this client does not operate the rig",
                  "call lease first"};
   }
-  spdlog::info("{} by {}", method, client.user);
+  logEvent(LogLevel::kInfo, "command", {{"method", method}, {"user", client.user}});
   if (row != nullptr) return plain(row->kind);
   if (method == "check-mapping") return checkMapping(params);
   return method == "jog" ? jog(params) : run(params, client);

@@ -17,6 +17,7 @@ namespace tenter::daemon {
 struct Client {
   std::uint64_t connection = 0;
   std::string user;
+  bool only_stops = false;  ///< One too many.
 };
 
 /// JSON-RPC 2.0, one document a line: docs/rig-safety.md. From any thread, one call a client.

@@ -4,7 +4,6 @@
 #include <grp.h>
 #include <poll.h>
 #include <pwd.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -13,8 +12,13 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <ctime>
+#include <thread>
 #include <vector>
+
+#include "daemon_log.h"
 
 namespace tenter::daemon {
 namespace {
@@ -22,8 +26,20 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLongestLine_bytes = std::size_t{1} << 20;
+/// Beyond so many clients those that come may only stop the rig, and beyond twice as many nothing.
 constexpr std::size_t kMaxConnections = 32;
 constexpr int kPoll_ms = 100;
+/// After each answer a client is not heard for so long, or for so many times the processor time
+/// that its request took: however many and however long requests are, the watch gets its turn.
+constexpr std::chrono::nanoseconds kLeastPause = std::chrono::milliseconds(10),
+                                   kLongestPause = std::chrono::seconds(1);
+constexpr int kPauseFactor = 20;
+
+std::chrono::nanoseconds threadTime() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
 
 Error socketError(const fs::path& path, const std::string& what) {
   return Error{ErrorKind::kBadInput, path.string(), "", what + ": " + std::strerror(errno), ""};
@@ -150,18 +166,30 @@ void SocketServer::greet(int descriptor) {
   ucred peer{};
   socklen_t size = sizeof peer;
   const bool known = getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
-  if (!known || !mayEnter(peer, group_) || connections_.size() >= kMaxConnections) {
-    spdlog::warn("refused a client of {}", userName(peer.uid));
+  if (!known || !mayEnter(peer, group_) || connections_.size() >= 2 * kMaxConnections) {
+    logEvent(LogLevel::kWarning, "refused-client", {{"user", userName(peer.uid)}});
     close(descriptor);
     return;
   }
+  const bool crowded = connections_.size() >= kMaxConnections;
   Connection& connection = connections_.emplace_back();
   connection.descriptor = descriptor;
-  const Client client{++last_connection_, userName(peer.uid)};
+  const Client client{++last_connection_, userName(peer.uid), crowded};
   connection.thread = std::thread([this, &connection, client] { serve(connection, client); });
 }
 
 void SocketServer::serve(Connection& connection, const Client& client) {
+  try {
+    converse(connection, client);
+  } catch (const std::exception& error) {
+    logEvent(LogLevel::kError, "client-failed", {{"user", client.user}, {"text", error.what()}});
+  }
+  rpc_.clientGone(client);
+  shutdown(connection.descriptor, SHUT_RDWR);
+  connection.done = true;
+}
+
+void SocketServer::converse(Connection& connection, const Client& client) {
   std::string pending;
   std::array<char, 4096> chunk{};
   bool open = true;
@@ -171,18 +199,19 @@ void SocketServer::serve(Connection& connection, const Client& client) {
     pending.append(chunk.data(), static_cast<std::size_t>(n));
     for (auto end = pending.find('\n'); open && end != std::string::npos;
          end = pending.find('\n')) {
+      const std::chrono::nanoseconds begun = threadTime();
       std::vector<Descriptor> attached;
       std::string answer = rpc_.answer(std::string_view(pending).substr(0, end), client, attached);
       pending.erase(0, end + 1);
-      if (answer.empty()) continue;
-      answer += '\n';
-      open = sendAll(connection.descriptor, answer, attached);
+      if (!answer.empty()) {
+        answer += '\n';
+        open = sendAll(connection.descriptor, answer, attached);
+      }
+      std::this_thread::sleep_for(
+          std::clamp(kPauseFactor * (threadTime() - begun), kLeastPause, kLongestPause));
     }
     if (pending.size() > kLongestLine_bytes) break;
   }
-  rpc_.clientGone(client);
-  shutdown(connection.descriptor, SHUT_RDWR);
-  connection.done = true;
 }
 
 void SocketServer::reap(bool all) {

@@ -37,6 +37,7 @@ class SocketServer {
   void acceptAll();
   void greet(int descriptor);
   void serve(Connection& connection, const Client& client);
+  void converse(Connection& connection, const Client& client);
   void reap(bool all);
 
   std::filesystem::path path_;

@@ -16,8 +16,8 @@
 namespace tenter {
 namespace {
 
-/// Of a fit that was stopped, bands and residuals each get no longer than this beyond the frames
-/// that are at work: on a fine replica all of them take the better part of an hour.
+/// Of a fit that was stopped, bands and residuals each get no longer than this: on a fine replica
+/// they take the better part of an hour.
 constexpr std::chrono::seconds kStoppedFitFinishes{10};
 
 std::function<bool()> after(std::chrono::seconds patience) {
@@ -67,7 +67,7 @@ std::vector<FramePrediction> judgedFrames(const FrameEvaluator& evaluator, int t
       [&] { return evaluator.cancelled(); });
   std::vector<FramePrediction> frames;
   for (std::optional<FramePrediction>& prediction : predictions)
-    if (prediction) frames.push_back(std::move(*prediction));
+    if (prediction && !prediction->outcome.cancelled) frames.push_back(std::move(*prediction));
   return frames;
 }
 
@@ -162,8 +162,8 @@ Result<FitResult> fitWithTests(const std::vector<Measurement>& measurements,
   FitRun run(**model, pointers, options);
   FitResult result;
   const bool ran = run.run();
-  // Cancelling is noticed between equilibria; from here on the answer is completed whatever
-  // happens, of a fit that was stopped as far as that is soon done.
+  // From here on the answer is completed whatever happens, of a fit that was stopped as far as that
+  // is soon done.
   result.cancelled = run.evaluator().cancelled();
   run.evaluator().cancelWhen(result.cancelled ? after(kStoppedFitFinishes)
                                               : std::function<bool()>());

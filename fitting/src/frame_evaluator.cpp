@@ -54,7 +54,14 @@ void parallelFor(int count, int threads, const std::function<void(int)>& work,
 
 FrameEvaluator::FrameEvaluator(std::vector<FitTest*> tests, int threads,
                                std::function<bool()> cancelled)
-    : tests_(std::move(tests)), threads_(threads), cancelled_(std::move(cancelled)) {}
+    : tests_(std::move(tests)), threads_(threads) {
+  cancelWhen(std::move(cancelled));
+}
+
+void FrameEvaluator::cancelWhen(std::function<bool()> cancelled) {
+  cancelled_ = std::move(cancelled);
+  for (FitTest* test : tests_) test->cancelWhen(cancelled_);
+}
 
 void FrameEvaluator::configure(std::shared_ptr<const FitSpace> space, std::vector<FrameId> frames) {
   space_ = std::move(space);
@@ -119,6 +126,7 @@ bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
     counts_.newton_steps += block.outcome.newton_steps;
     counts_.factorizations += block.outcome.factorizations;
   }
+  if (cancelled()) return false;  // what failed may only have been stopped
   if (failed) {
     ++counts_.failures;
     failed_point_ = z;
@@ -126,7 +134,7 @@ bool FrameEvaluator::evaluate(const Eigen::VectorXd& z, bool stop_at_failure) {
     std::stable_partition(order_.begin(), order_.end(),
                           [&](int i) { return isLost(blocks_[i].outcome); });
   }
-  if (failed || cancelled()) return false;
+  if (failed) return false;
   point_ = z;
   valid_ = true;
   return true;

@@ -61,8 +61,8 @@ class FrameEvaluator {
   double cost() const;  ///< Half the sum of squares at the point evaluated last.
   double cost(int test) const;
   bool cancelled() const { return cancelled_ && cancelled_(); }
-  /// From here on another reason to stop; empty: none.
-  void cancelWhen(std::function<bool()> cancelled) { cancelled_ = std::move(cancelled); }
+  /// From here on another reason to stop, also within an equilibrium; empty: none.
+  void cancelWhen(std::function<bool()> cancelled);
   /// Of all tests (FitTest::requireProof).
   void requireProof(bool required);
   const SolveCounts& counts() const { return counts_; }

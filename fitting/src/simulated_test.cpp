@@ -135,14 +135,15 @@ EquilibriumOptions SimulatedTest::solverOptions(int max_iterations) const {
   EquilibriumOptions solver;
   solver.prove_stability = require_proof_;
   solver.max_iterations = max_iterations;
+  solver.cancelled = cancelled_;
   solver.force_tolerance_N =
       options_.equilibrium_tolerance_N > 0.0 ? options_.equilibrium_tolerance_N : forceTolerance_N;
   return solver;
 }
 
 bool SimulatedTest::isCurrent(const Solution& s) const {
-  return s.generation == generation_ && s.parameters.size() == parameters_.size() &&
-         s.parameters == parameters_;
+  return !s.outcome.cancelled && s.generation == generation_ &&
+         s.parameters.size() == parameters_.size() && s.parameters == parameters_;
 }
 
 std::vector<ClothState> SimulatedTest::warmStarts(const Simulation& simulation,
@@ -179,8 +180,9 @@ FrameOutcome SimulatedTest::solveFrom(Simulation& simulation, std::vector<ClothS
     outcome.converged = summary.converged();
     outcome.stable = summary.converged() && summary.stable;
     outcome.proven = summary.converged() && summary.proven;
+    outcome.cancelled = summary.termination == Termination::kCancelled;
     outcome.problem = describe(summary.termination);
-    if (outcome.converged) break;
+    if (outcome.converged || outcome.cancelled) break;
   }
   if (outcome.converged) outcome.problem = outcome.stable ? "" : "unstable equilibrium";
   return outcome;
@@ -211,7 +213,7 @@ FrameOutcome SimulatedTest::solveFromStart(Simulation& simulation, int index, in
                            return nearlyEqual(a.curve, b.curve);
                          })) {
     FrameOutcome outcome = solveFrom(simulation, {frame.from_start->state}, kWarmIterations, state);
-    if (outcome.stable) return outcome;
+    if (outcome.stable || outcome.cancelled) return outcome;
   }
   FrameOutcome outcome =
       solveFrom(simulation, coldStarts(simulation, index), max_iterations, state);
@@ -238,7 +240,7 @@ Eigen::MatrixXd SimulatedTest::solve(Simulation& simulation, int index, bool wit
     Solution fresh{generation_, {}, parameters_, {}, {}};
     outcome =
         solveFrom(simulation, warmStarts(simulation, frame.accepted), kWarmIterations, fresh.state);
-    if (!outcome.converged) {
+    if (!outcome.converged && !outcome.cancelled) {
       const FrameOutcome warm = outcome;
       // A frame that had a state and loses it says that the point is bad: the outer loop steps back
       // from it, so it is tried again once and not from everywhere.

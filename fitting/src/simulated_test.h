@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -42,6 +43,7 @@ class SimulatedTest : public FitTest {
   void restart() final;
   void reweigh() final;
   void requireProof(bool required) final { require_proof_ = required; }
+  void cancelWhen(std::function<bool()> cancelled) final { cancelled_ = std::move(cancelled); }
   MultistabilityReport crossCheck(int frame) final;
   bool adoptNearerShape(int frame) final;
   FramePrediction predict(int frame, bool with_derivatives) final;
@@ -139,6 +141,7 @@ class SimulatedTest : public FitTest {
   Bases bases_;
   std::shared_ptr<const Curves> curves_;  ///< Null where laws were given instead.
   bool require_proof_ = true;
+  std::function<bool()> cancelled_;
   int generation_ = 0;  ///< Counts changes of the parameters' structure.
   Eigen::VectorXd parameters_;
   std::vector<std::unique_ptr<Replica>> replicas_;

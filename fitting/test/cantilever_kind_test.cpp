@@ -88,6 +88,23 @@ TEST(CantileverKindTest, ConvergesForAnyRigidityInAnyOrder) {
   }
 }
 
+TEST(CantileverKindTest, AStoppedSearchIsNotAnAnswer) {
+  const ClothModel& model = modelNamed("stvk");
+  auto test = makeFitTest(cantilever(0.0), model, {}).value();
+  test->setParameters(rigidity(model, 17.5));
+  Eigen::VectorXd r;
+  int polls = 0;
+  test->cancelWhen([&] { return ++polls > 2; });
+  const FrameOutcome stopped = test->evaluate(0, r, nullptr);
+  EXPECT_TRUE(stopped.cancelled);
+  EXPECT_FALSE(stopped.converged);
+  EXPECT_EQ(polls, 3);  // no other start is tried
+  test->accept();
+  test->cancelWhen({});
+  const FrameOutcome again = test->evaluate(0, r, nullptr);
+  EXPECT_TRUE(again.converged && again.stable && !again.cancelled) << again.problem;
+}
+
 TEST(CantileverKindTest, JacobianMatchesFiniteDifferences) {
   for (const auto& [id, angle_deg] : {std::pair{"stvk", 90.0}, {"soft", 45.0}, {"springs", 0.0}}) {
     const ClothModel& model = modelNamed(id);

@@ -32,6 +32,9 @@ constexpr int kMaxChoices = 5;
 /// exists.
 constexpr double kExplanation_s = 120.0;
 constexpr double kStiffnessSearch_s = 20.0;
+/// Of a preference for the rest shape, before it is left out.
+constexpr int kHalvings = 4;
+constexpr double kLeastBudget_s = 1e-3;
 /// Far above what an eigenvalue is known to, far below that of any sheet a person can touch.
 constexpr double kLambdaFloor_per_s2 = 0.05;
 
@@ -52,6 +55,10 @@ class Inverter {
       out_.proof = findSlidingProof(problem_.contacts, problem_.material.gravity_m_per_s2);
     if (out_.proof) return finish();
     if (options_.method == InversionMethod::kReference) return reference();
+    if (options_.preference.kind != RestShapeKind::kNearTarget) {
+      wanted_angle_ = wantedAngles(shell_, options_.preference);
+      wish_ = bendingGradient(shell_, wanted_angle_);
+    }
     if (options_.rest == RestKind::kMetric) return metric();
     const std::clock_t before = std::clock();
     auto contact_forces = ContactForces::create(shell_, newton_);
@@ -101,8 +108,10 @@ class Inverter {
   bool balance(ContactForces& contact_forces, double load) {
     for (int k = 0; k < kMaxChoices && !stopped(); ++k) {
       const std::clock_t before = std::clock();
-      auto f = contact_forces.solve(newton_.gradient(unknowns_, load), margin_, load,
-                                    [this] { return stopped(); });
+      Eigen::VectorXd gradient = newton_.gradient(unknowns_, load);
+      // What was balanced before has had its wish.
+      if (k == 0 && wish_.size() > 0) gradient += (load - load_) * wish_;
+      auto f = contact_forces.solve(gradient, margin_, load, [this] { return stopped(); });
       out_.forces_cpu_seconds += cpuSecondsSince(before);
       out_.factorizations += f.factorizations;
       say("contact forces chosen: %.0f, %.0f factorizations", f.converged ? 1.0 : 0.0,
@@ -150,6 +159,7 @@ class Inverter {
                                   const std::function<bool()>& stop) {
     MetricOptions o;
     o.lambda_floor_per_s2 = kLambdaFloor_per_s2;
+    o.wanted_angle_rad = wanted_angle_;
     o.stop = stop;
     o.progress = [this](const char* stage, double lambda) {
       say((std::string("metric rest state: ") + stage + ", lambda_min %.4g").c_str(), lambda);
@@ -257,8 +267,18 @@ class Inverter {
     if (out_.softness_proof && out_.status != InversionStatus::kCertified)
       out_.status = InversionStatus::kInfeasible;
     out_.reason = reason();
+    out_.preference = options_.preference;
+    measureShapes();
     out_.seconds = seconds();
     return out_;
+  }
+
+  void measureShapes() {
+    const Eigen::VectorXd smooth = fairedAngles(shell_, options_.preference.smoothing_length_m);
+    const auto of = [&](const Points3& x) { return elementsOf(shell_.topology(), x); };
+    out_.target_shape = measureShape(shell_, of(problem_.target.positions), smooth);
+    out_.rest_shape =
+        measureShape(shell_, out_.element_rest ? *out_.element_rest : of(out_.rest), smooth);
   }
 
   std::string reason() const {
@@ -317,10 +337,37 @@ class Inverter {
   RestNewton newton_{shell_, problem_.target.positions, problem_.fixed, problem_.contacts};
   ConeMargin margin_;
   RestUnknowns unknowns_;
+  /// Of RestPreference: rest angles, and the moments that hold a shell with them in the target's
+  /// shape; empty without.
+  Eigen::VectorXd wanted_angle_, wish_;
   Points3 forces_;     ///< Of the contacts that unknowns_ balances.
   double load_ = 0.0;  ///< Share of gravity that is balanced.
   InversionResult out_;
 };
+
+/// With ever less of the preference until the certificate holds. Counts and times are sums.
+Result<InversionResult> invertWithPreference(const InversionProblem& problem,
+                                             const InversionOptions& options,
+                                             const InverseShell& shell) {
+  InversionOptions now = options;
+  InversionResult sum;
+  for (int k = 0; k <= kHalvings; ++k) {
+    if (k == kHalvings) now.preference = {};
+    now.explain = options.explain && k == kHalvings;
+    auto result = Inverter(problem, now, shell).run();
+    if (!result) return result;
+    result->seconds += sum.seconds;
+    result->solve_cpu_seconds += sum.solve_cpu_seconds;
+    result->forces_cpu_seconds += sum.forces_cpu_seconds;
+    result->factorizations += sum.factorizations;
+    if (result->status != InversionStatus::kNotConverged || k == kHalvings) return result;
+    sum = std::move(result).value();
+    now.preference.share *= 0.5;
+    if (options.time_budget_s > 0.0)
+      now.time_budget_s = std::max(options.time_budget_s - sum.seconds, kLeastBudget_s);
+  }
+  return sum;
+}
 
 }  // namespace
 
@@ -345,7 +392,9 @@ Result<InversionResult> invert(const InversionProblem& problem, const InversionO
     return badInput("", "", "nothing holds the target: it falls",
                     "give an obstacle that it touches, or hold vertices");
   }
-  return Inverter(problem, options, std::move(shell).value()).run();
+  if (options.preference.kind == RestShapeKind::kNearTarget)
+    return Inverter(problem, options, std::move(shell).value()).run();
+  return invertWithPreference(problem, options, *shell);
 }
 
 }  // namespace tenter

@@ -157,6 +157,18 @@ Result<void> writeMeshes(const std::filesystem::path& folder, const InversionPro
                        {{"stretch", c.stretch.transpose()}, {"bend_rad", c.bend_rad.transpose()}});
 }
 
+nlohmann::json preferenceJson(const RestPreference& preference) {
+  if (preference.kind == RestShapeKind::kNearTarget) return nullptr;
+  return {{"kind", preference.kind == RestShapeKind::kFlat ? "flat" : "smooth"},
+          {"share", preference.share}};
+}
+
+nlohmann::json shapeJson(const ShapeMeasures& shape) {
+  return {{"bend_rms_rad", shape.bend_rms_rad},
+          {"fold_rms_rad", shape.fold_rms_rad},
+          {"defect_rms_rad", shape.defect_rms_rad}};
+}
+
 }  // namespace
 
 nlohmann::json certificateToJson(const InversionProblem& problem, const InversionResult& result,
@@ -191,6 +203,9 @@ nlohmann::json certificateToJson(const InversionProblem& problem, const Inversio
       {"stretch_min", c.stretch.minCoeff()},
       {"stretch_max", c.stretch.cwiseAbs().maxCoeff()},
       {"bend_max_rad", c.bend_rad.maxCoeff()},
+      {"preference", preferenceJson(result.preference)},
+      {"target_shape", shapeJson(result.target_shape)},
+      {"rest_shape", shapeJson(result.rest_shape)},
       {"proof", proofJson(result)},
       {"load_balanced", result.load_balanced},
       {"seconds", result.seconds},

@@ -93,11 +93,25 @@ class Search {
     auto forces = ContactForces::create(shell_, problem_);
     if (!forces) return std::nullopt;
     const RestUnknowns target{problem_.pose(), Eigen::VectorXd::Zero(shell_.rotationCount())};
-    const auto solved = forces->solve(problem_.gradient(target, 1.0), kMargin, 1.0, options_.stop);
+    const Eigen::VectorXd wanted = wantedZ();
+    Eigen::VectorXd gradient = problem_.gradient(target, 1.0);
+    gradient += elements_.forces(wanted);
+    const auto solved = forces->solve(gradient, kMargin, 1.0, options_.stop);
     factorizations_ += solved.factorizations;
     if (!solved.converged) return std::nullopt;
     Eigen::VectorXd z = elements_.works(solved.motion);
     for (int i = 0; i < elements_.count(); ++i) z[i] /= elements_.all()[i].stiffness;
+    return wanted + z;
+  }
+
+  /// Of the wanted rest angles, and the target's lengths.
+  Eigen::VectorXd wantedZ() const {
+    Eigen::VectorXd z = Eigen::VectorXd::Zero(elements_.count());
+    if (options_.wanted_angle_rad.size() == 0) return z;
+    for (int i = 0; i < elements_.count(); ++i) {
+      const MetricElement& e = elements_.all()[i];
+      if (e.hinge) z[i] = e.value - options_.wanted_angle_rad[e.edge];
+    }
     return z;
   }
 

@@ -11,6 +11,8 @@ namespace tenter {
 
 struct MetricOptions {
   double lambda_floor_per_s2 = 0.0;  ///< What the smallest eigenvalue has to reach.
+  /// Rest angles that are wished for, one a mesh edge [rad]; empty: the target's.
+  Eigen::VectorXd wanted_angle_rad;
   std::function<bool()> stop;
   std::function<void(const char* stage, double lambda_min_per_s2)> progress;
 };
@@ -28,10 +30,10 @@ struct MetricResult {
   int factorizations = 0;
 };
 
-/// Least elastic energy first, which is as good as it gets where it is stable (the convex choice of
-/// contact forces); else an interior-point method over all states, with the Hessian kept positive
-/// on a growing space of soft motions (docs/inversion.md). Error: a material without element rest,
-/// or nothing is free.
+/// Least elastic energy (to the wanted rest angles) first, which is as good as it gets where it is
+/// stable (the convex choice of contact forces); else an interior-point method over all states,
+/// with the Hessian kept positive on a growing space of soft motions (docs/inversion.md). Error: a
+/// material without element rest, or nothing is free.
 Result<MetricResult> findMetricRest(InverseShell& shell, const RestNewton& problem,
                                     const MetricOptions& options);
 

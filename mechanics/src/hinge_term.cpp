@@ -7,6 +7,7 @@
 #include "parameter_scratch.h"
 #include "projection.h"
 #include "tenter/mechanics/dihedral_angle.h"
+#include "tenter/mechanics/element_rest.h"
 #include "tenter/mechanics/energy_terms.h"
 
 namespace tenter {
@@ -232,6 +233,14 @@ class HingeBending final : public EnergyTerm {
   HingeElements elements_;
 };
 
+HingeTerm termOf(HingeElements elements, std::shared_ptr<const StrainLaw> law) {
+  HingeTerm out;
+  out.rotation_edge = elements.rotation_edge;
+  out.rotation_count = static_cast<int>(elements.rotation_edge.size());
+  out.term = std::make_unique<HingeBending>(std::move(elements), std::move(law));
+  return out;
+}
+
 }  // namespace
 
 HingeTerm makeHingeTerm(const SheetMesh& sheet, std::shared_ptr<const StrainLaw> law,
@@ -241,12 +250,21 @@ HingeTerm makeHingeTerm(const SheetMesh& sheet, std::shared_ptr<const StrainLaw>
   require(
       rigid_triangles.empty() || static_cast<int>(rigid_triangles.size()) == sheet.triangleCount(),
       "makeHingeTerm: one rigid mark per triangle");
-  HingeElements elements = buildHingeElements(sheet, rigid_triangles, rotations, first_coordinate);
-  HingeTerm out;
-  out.rotation_edge = elements.rotation_edge;
-  out.rotation_count = static_cast<int>(elements.rotation_edge.size());
-  out.term = std::make_unique<HingeBending>(std::move(elements), std::move(law));
-  return out;
+  return termOf(buildHingeElements(sheet, rigid_triangles, rotations, first_coordinate),
+                std::move(law));
+}
+
+HingeTerm makeHingeTerm(const SheetMesh& sheet, std::shared_ptr<const StrainLaw> law,
+                        EdgeRotations rotations, int first_coordinate, const ElementRest& rest) {
+  require(law != nullptr, "makeHingeTerm: no law");
+  require(rest.angle_rad.size() == static_cast<Eigen::Index>(sheet.topology.edges.size()),
+          "makeHingeTerm: one rest angle a mesh edge");
+  HingeElements elements = buildHingeElements(sheet, {}, rotations, first_coordinate);
+  std::size_t hinge = 0;  // without rigid triangles every inner edge is one, in the mesh's order
+  for (std::size_t e = 0; e < sheet.topology.edges.size(); ++e)
+    if (sheet.topology.edges[e].triangles[1] >= 0)
+      elements.edges[hinge++].rest_angle = rest.angle_rad[static_cast<Eigen::Index>(e)];
+  return termOf(std::move(elements), std::move(law));
 }
 
 }  // namespace tenter

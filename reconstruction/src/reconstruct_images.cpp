@@ -70,10 +70,14 @@ MeasurementFrame measuredFrame(const ClothFrame& cloth, std::int64_t time_ns) {
   frame.position_sigma_axes_m.resize(3, cloth.positions_m.cols());
   for (std::size_t i = 0; i < cloth.states.size(); ++i) {
     const auto column = static_cast<Eigen::Index>(i);
-    frame.position_sigma_m(column) = sigmaOf(cloth.covariances_m2[i]);
+    // A place whose uncertainty is not known is no measurement.
+    const Mat3& covariance = cloth.covariances_m2[i];
+    const bool known = covariance.allFinite() && covariance.diagonal().minCoeff() >= 0.0;
+    frame.position_sigma_m(column) = known ? sigmaOf(covariance) : 0.0;
     frame.position_sigma_axes_m.col(column) =
-        cloth.covariances_m2[i].diagonal().cwiseMax(0.0).cwiseSqrt();
-    frame.valid.push_back(static_cast<std::uint8_t>(cloth.states[i] == PointState::kValid));
+        known ? Vec3(covariance.diagonal().cwiseSqrt()) : Vec3(Vec3::Zero());
+    frame.valid.push_back(
+        static_cast<std::uint8_t>(known && cloth.states[i] == PointState::kValid));
   }
   return frame;
 }

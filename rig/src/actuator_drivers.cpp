@@ -16,8 +16,9 @@ std::unique_ptr<ActuatorDriver> make(const AxisConfig& config) {
 }
 
 constexpr std::array kDrivers = {
-    ActuatorDriverRow{"tic", tic::kVendor, tic::kProducts, checkTicConfig, make<TicActuator>},
-    ActuatorDriverRow{"lac", lac::kVendor, lac::kProducts, checkLacConfig, make<LacActuator>},
+    ActuatorDriverRow{"tic", tic::kVendor, tic::kProducts, checkTicConfig, make<TicActuator>, true},
+    ActuatorDriverRow{"lac", lac::kVendor, lac::kProducts, checkLacConfig, make<LacActuator>,
+                      false},
 };
 
 constexpr std::array<std::string_view, 6> kStateNames = {

@@ -68,6 +68,9 @@ int leadCounts(const AxisConfig& config, double speed_m_per_s) {
   return static_cast<int>(std::floor(speed_m_per_s * lead_s / std::abs(config.metres_per_unit)));
 }
 
+/// Its controller stands still within a few counts of the target.
+constexpr int kArrivedCounts = 8;
+
 }  // namespace
 
 Result<void> checkLacConfig(const AxisConfig& config) {
@@ -79,6 +82,9 @@ Result<void> checkLacConfig(const AxisConfig& config) {
   }
   if (!powerFor(config, config.max_speed_m_per_s)) {
     return badInput("", place + "max_speed_m_per_s", "the actuator's full speed is not above it");
+  }
+  if (config.kill_switch) {
+    return badInput("", place + "kill_switch", "a LAC has no input for one and cannot report it");
   }
   if (leadCounts(config, config.max_speed_m_per_s) < 1) {
     return badInput("", place + "max_speed_m_per_s",
@@ -105,6 +111,8 @@ void LacActuator::takePosition(int count) {
   status.state = ActuatorState::kNormal;
   status.energised = true;
   status.position_uncertain = false;
+  if (home_ && std::abs(count - *home_) <= kArrivedCounts) home_.reset();
+  status.homing = home_.has_value();
   status.at_min = status.position_m <= config_.travel_min_m;
   status.at_max = status.position_m >= config_.travel_max_m;
   status.taken_at = std::chrono::steady_clock::now();
@@ -112,6 +120,7 @@ void LacActuator::takePosition(int count) {
 }
 
 UsbScript LacActuator::start() {
+  home_.reset();
   speed_m_per_s_ = config_.max_speed_m_per_s;
   const int power = powerFor(config_, speed_m_per_s_).value_or(0);
   enum class Step { kManual, kFeedback, kHold, kSpeed, kEnd };
@@ -178,6 +187,7 @@ UsbScript LacActuator::setTarget(double position_m) {
     return usbFailure(ActuatorFault::kOutOfRange, "target [m] " + std::to_string(position_m));
   }
   goal_ = count;
+  home_.reset();
   return follow();
 }
 
@@ -190,7 +200,9 @@ UsbScript LacActuator::withSpeed(double speed_m_per_s, std::optional<int> goal) 
                   [this, speed_m_per_s, goal, power](const int* answer) -> std::optional<Packet> {
                     if (answer == nullptr) return Packet{command::kSetSpeed, *power};
                     speed_m_per_s_ = speed_m_per_s;
-                    if (goal) goal_ = goal;  // the next keepAlive sets off
+                    if (!goal) return {};
+                    goal_ = goal;  // the next keepAlive sets off
+                    home_.reset();
                     return {};
                   });
 }
@@ -205,6 +217,7 @@ UsbScript LacActuator::setSpeedLimit(double speed_m_per_s) { return withSpeed(sp
 
 UsbScript LacActuator::haltAndHold() {
   goal_.reset();
+  home_.reset();
   enum class Step { kFeedback, kHold, kEnd };
   return converse(
       unfinished_,
@@ -234,7 +247,10 @@ UsbScript LacActuator::exitSafeStart() { return nothing(); }
 UsbScript LacActuator::clearDriverError() { return nothing(); }
 
 UsbScript LacActuator::goHome(HomeTowards end) {
-  return setTarget(end == HomeTowards::kMax ? config_.travel_max_m : config_.travel_min_m);
+  UsbScript script =
+      setTarget(end == HomeTowards::kMax ? config_.travel_max_m : config_.travel_min_m);
+  home_ = goal_;
+  return script;
 }
 
 UsbScript LacActuator::keepAlive() { return follow(); }

@@ -40,6 +40,7 @@ class LacActuator : public ActuatorDriver {
   double speed_m_per_s_;
   bool unfinished_ = true;   ///< An answer may still be in the pipe.
   std::optional<int> goal_;  ///< Where it is to go; nothing while it holds.
+  std::optional<int> home_;  ///< The end that it was sent home to, until it is there.
 };
 
 }  // namespace tenter

@@ -89,7 +89,7 @@ void readCells(JsonReader& in, RigConfig& rig, const std::optional<fs::path>& fo
     cell.unit = static_cast<int>(entry.integer("unit", 1, 247));
     cell.map = maps.get(entry);
     cell.capacity_N = entry.number("capacity_N", Range::positive(1e5));
-    cell.lowest_N = entry.numberOr("lowest_N", cell.lowest_N, Range::between(-1e5, 0.0));
+    cell.lowest_N = entry.numberOr("lowest_N", -rig.limits.slack_N, Range::between(-1e5, 0.0));
     if (entry.has("reversed")) cell.reversed = entry.boolean("reversed");
     if (entry.has("stuck_after_ms")) {
       cell.stuck_after = std::chrono::milliseconds(entry.integer("stuck_after_ms", 0, 60'000));
@@ -159,7 +159,7 @@ RigAxis readAxis(JsonReader entry, const RigConfig& rig) {
   onlyKnownKeys(entry,
                 {"name", "driver", "serial", "port", "metres_per_unit", "origin_m", "travel_m",
                  "max_speed_m_per_s", "max_acceleration_m_per_s2", "command_timeout_ms",
-                 "full_speed_m_per_s", "cell"},
+                 "full_speed_m_per_s", "kill_switch", "cell"},
                 kPage);
   RigAxis axis;
   AxisConfig& device = axis.device;
@@ -180,6 +180,9 @@ RigAxis readAxis(JsonReader entry, const RigConfig& rig) {
   device.max_acceleration_m_per_s2 =
       entry.numberOr("max_acceleration_m_per_s2", 0.0, Range::nonNegative(100.0));
   device.full_speed_m_per_s = entry.numberOr("full_speed_m_per_s", 0.0, Range::nonNegative(1.0));
+  const ActuatorDriverRow* driver = findActuatorDriver(device.driver);
+  device.kill_switch = entry.has("kill_switch") ? entry.boolean("kill_switch")
+                                                : driver != nullptr && driver->sees_kill_switch;
   if (entry.has("command_timeout_ms")) {
     device.command_timeout =
         std::chrono::milliseconds(entry.integer("command_timeout_ms", 60, 200));

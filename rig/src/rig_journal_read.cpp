@@ -59,7 +59,8 @@ std::vector<std::optional<std::int64_t>> readTimes(JsonReader& in, const std::st
     if (!value.is_null() && !value.is_number_integer()) in.fail(key, "must be whole numbers");
     times.push_back(value.is_number_integer() ? std::optional(value.get<std::int64_t>())
                                               : std::nullopt);
-    if (times.back() && std::abs(*times.back()) > kMost_ns) in.fail(key, "is beyond all times");
+    if (times.back() && (*times.back() < -kMost_ns || *times.back() > kMost_ns))
+      in.fail(key, "is beyond all times");
   }
   return times;
 }

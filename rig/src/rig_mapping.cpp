@@ -34,7 +34,7 @@ void RigMachine::startMapping(const std::vector<int>& axes) {
   findings_.clear();
   changeState(RigState::kRunning, "checking which cell each axis pulls");
   begin(Activity::kMap);
-  if (protocol_) origins_m_ = known_m_;
+  if (protocol_) keepOrigins();
   loading_ = true;
 }
 
@@ -75,6 +75,7 @@ void RigMachine::mappingDone() {
   if (protocol_) return startProtocol();
   loading_ = false;
   activity_ = Activity::kNone;
+  conclude("done", "");
 }
 
 }  // namespace tenter

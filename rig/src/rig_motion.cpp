@@ -14,7 +14,7 @@ constexpr double kHomeFirst_s = 0.3;
 constexpr double kHomeLimit_s = 120.0, kUnloadLimit_s = 120.0;
 constexpr double kSlackShare = 0.8;  // of slack_N, so that noise does not make it a load again
 constexpr int kTareTicks = 25;
-constexpr double kMaxTareShare = 0.2;  // of the working force; more is a load, not a tare
+constexpr double kUnsteadyShare = 1.0;  // of slack_N: what swings more has no zero
 constexpr double kArrived_m = 1e-9;
 constexpr double kFar_m = 1e3;
 /// What an axis may go beyond where it should be, if it is not told anything more.
@@ -39,9 +39,19 @@ void RigMachine::begin(Activity activity) {
     setpoints_m_[i] = std::clamp(known_m_[i], axis.travel_min_m, axis.travel_max_m);
   }
   const bool on_its_own = activity == Activity::kJog || activity == Activity::kMap;
-  if (!protocol_ && on_its_own) origins_m_ = known_m_;
+  if (!protocol_ && on_its_own) keepOrigins();
   history_N_.clear();
   history_ns_.clear();
+}
+
+/// Where a cord is slack: it may be let out to there should its cell fall silent.
+void RigMachine::keepOrigins() {
+  for (std::size_t i = 0; i < known_m_.size(); ++i) {
+    const std::optional<int> cell = config_.axes[i].cell;
+    const auto tension_N = cell ? net_N(static_cast<std::size_t>(*cell)) : std::optional(0.0);
+    const bool slack = tension_N && *tension_N <= config_.limits.slack_N;
+    if (slack) origins_m_[i] = known_m_[i];
+  }
 }
 
 void RigMachine::decide(const std::string& name, std::string data) {
@@ -57,15 +67,16 @@ std::optional<double> RigMachine::net_N(std::size_t cell) const {
 double RigMachine::highestForce_N() const {
   double highest = 0.0;
   for (const CellInput& cell : tick_->cells)
-    highest = std::max(highest, cell.gross_N.value_or(0.0));
+    highest = std::max(highest, std::abs(cell.gross_N.value_or(0.0)));
   return highest;
 }
 
-/// Loading axes add up on one sample, so their sum keeps to the cap.
+/// Loading axes add up on one sample, so their sum keeps to the cap, catching up included.
 void RigMachine::move(const std::vector<double>& velocities_m_per_s) {
   double loading_m_per_s = 0.0;
   for (const double v : velocities_m_per_s) loading_m_per_s += std::max(v, 0.0);
   const double scale = loading_m_per_s > cap_m_per_s_ ? cap_m_per_s_ / loading_m_per_s : 1.0;
+  double told_m_per_s = 0.0;
   for (std::size_t i = 0; i < velocities_m_per_s.size(); ++i) {
     const double v = velocities_m_per_s[i] * (velocities_m_per_s[i] > 0.0 ? scale : 1.0);
     if (v == 0.0) continue;
@@ -83,7 +94,11 @@ void RigMachine::move(const std::vector<double>& velocities_m_per_s) {
     const bool late = behind_m > kBehindTicks * std::abs(v) * dt_s_;
     orders_->speeds_m_per_s[i] =
         std::min(axis.max_speed_m_per_s, std::abs(v) * (late ? kCatchUp : 1.0));
+    if (v > 0.0) told_m_per_s += orders_->speeds_m_per_s[i];
   }
+  if (told_m_per_s <= cap_m_per_s_) return;
+  for (std::size_t i = 0; i < velocities_m_per_s.size(); ++i)
+    if (velocities_m_per_s[i] > 0.0) orders_->speeds_m_per_s[i] *= cap_m_per_s_ / told_m_per_s;
 }
 
 void RigMachine::act() {
@@ -114,7 +129,7 @@ void RigMachine::actJog() {
   const double left_m = jog_target_m_ - setpoints_m_[axis];
   if (std::abs(left_m) <= kArrived_m) {
     activity_ = Activity::kNone;
-    return;
+    return conclude("done", "");
   }
   const double step_m = std::min(jog_speed_m_per_s_ * dt_s_, std::abs(left_m));
   goals_m_[axis] = jog_target_m_;
@@ -143,35 +158,49 @@ void RigMachine::actHome() {
   });
   if (done) {
     decide("homed");
+    conclude("done", "");
     activity_ = Activity::kNone;
   } else if (seconds() > kHomeLimit_s) {
     trip("rig", "homing-timeout", "not every axis found its end");
   }
 }
 
+/// Only what is slack and steady has a zero: no further from the amplifier's own, or the one taken
+/// last, than what counts as slack. A load that became the zero would be invisible to unloading.
 void RigMachine::actTare() {
+  const auto refuse = [&](std::size_t cell, const std::string& why) {
+    activity_ = Activity::kNone;
+    const std::string& name = config_.cells[cell].id;
+    decide("tare-refused", nlohmann::json{{"cell", name}, {"why", why}}.dump());
+    conclude("refused", name + " " + why);
+  };
   for (std::size_t i = 0; i < config_.cells.size(); ++i) {
-    if (!tick_->cells[i].gross_N) {
-      activity_ = Activity::kNone;
-      return decide("tare-refused", nlohmann::json{{"cell", config_.cells[i].id}}.dump());
-    }
-    tare_sums_N_[i] += *tick_->cells[i].gross_N;
+    const auto& gross_N = tick_->cells[i].gross_N;
+    if (!gross_N) return refuse(i, "gives no tension");
+    tare_sums_N_[i] += *gross_N;
+    tare_lowest_N_[i] = std::min(tare_lowest_N_[i], *gross_N);
+    tare_highest_N_[i] = std::max(tare_highest_N_[i], *gross_N);
   }
   if (++tare_ticks_ < kTareTicks) return;
-  activity_ = Activity::kNone;
   std::vector<double> tares_N;
   for (std::size_t i = 0; i < config_.cells.size(); ++i) {
     tares_N.push_back(tare_sums_N_[i] / kTareTicks);
-    if (std::abs(tares_N[i]) > kMaxTareShare * config_.limits.working_N) {
-      return decide("tare-refused", nlohmann::json{{"cell", config_.cells[i].id}}.dump());
+    if (tare_highest_N_[i] - tare_lowest_N_[i] > kUnsteadyShare * config_.limits.slack_N)
+      return refuse(i, "is not steady");
+    if (std::min(std::abs(tares_N[i]), std::abs(tares_N[i] - tares_N_[i])) >
+        config_.limits.slack_N) {
+      return refuse(i, "is under load: unload first");
     }
   }
+  activity_ = Activity::kNone;
   tares_N_ = tares_N;
   decide("tare", nlohmann::json{{"tares_N", tares_N_}}.dump());
+  conclude("done", "");
 }
 
 void RigMachine::startUnloading() {
   begin(Activity::kUnload);
+  frozen_.assign(frozen_.size(), false);
   loading_ = false;
   orders_->release_halt = !orders_->halt;
   unload_ceiling_N_ =
@@ -190,14 +219,22 @@ void RigMachine::actUnload() {
     const auto tension_N = net_N(static_cast<std::size_t>(*axis.cell));
     const bool slack = tension_N ? *tension_N <= kSlackShare * config_.limits.slack_N
                                  : setpoints_m_[i] <= origins_m_[i];
-    if (slack) continue;
+    const auto leave = [&](const std::string& why) { left += (left.empty() ? "" : ", ") + why; };
+    if (slack) {
+      // At where its cord was slack last; whether it is now nobody knows.
+      if (!tension_N)
+        leave(config_.cells[static_cast<std::size_t>(*axis.cell)].id + " gives no tension");
+      continue;
+    }
     const AxisInput& input = axes_[i];
-    if (!input.energised || !input.fault.empty() || !input.position_m) {
-      left += (left.empty() ? "" : ", ") + axis.device.name + " does not move";
+    if (frozen_[i]) {
+      leave(axis.device.name + " does not follow");
+    } else if (!input.energised || !input.fault.empty() || !input.position_m) {
+      leave(axis.device.name + " does not move");
     } else if (setpoints_m_[i] <= axis.device.travel_min_m) {
       // it may still be on its way to where it was sent last
       if (known_m_[i] > axis.device.travel_min_m + config_.limits.following_error_m) going = true;
-      left += (left.empty() ? "" : ", ") + axis.device.name + " is at the end of its travel";
+      leave(axis.device.name + " is at the end of its travel");
     } else {
       going = true;
       velocities[i] = -axis.device.max_speed_m_per_s;
@@ -213,6 +250,7 @@ void RigMachine::actUnload() {
 }
 
 void RigMachine::unloadingEnded(const std::string& left) {
+  conclude(left.empty() ? "done" : "not-unloaded", left);
   if (left.empty()) return decide("unloaded");
   decide("not-unloaded", nlohmann::json{{"why", left}}.dump());
   changeState(RigState::kFault, "not unloaded: " + left);

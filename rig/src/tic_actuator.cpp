@@ -123,6 +123,12 @@ UsbScript TicActuator::start() {
       if (previous->data[setting::kDisableSafeStart] != 0) {
         return UsbStep::fail(ActuatorFault::kRefused, "its safe start is disabled");
       }
+      if (config_.kill_switch && previous->data[setting::kKillSwitchMap] == 0) {
+        return UsbStep::fail(
+            ActuatorFault::kRefused,
+            "no pin of it is a kill switch, so the emergency stop would not be seen (set one in "
+            "its settings, or say kill_switch = false in the rig's file)");
+      }
       wait = Wait::kChanges;
       changes = settingChanges(config_, previous->data);
       return UsbStep::send(changes[next++]);

@@ -49,6 +49,33 @@ TEST(LacActuator, StartSilencesTheKnobsAndHoldsWhereItIs) {
   EXPECT_DOUBLE_EQ(driver.lastStatus().position_m, 0.05);
 }
 
+TEST(LacActuator, ItIsHomingUntilItIsAtTheEnd) {
+  LacActuator driver(axisConfig());
+  FakeLac device;
+  play(driver.start(), std::ref(device));
+  EXPECT_FALSE(driver.lastStatus().homing);
+  play(driver.goHome(HomeTowards::kMin), std::ref(device));
+  EXPECT_TRUE(driver.lastStatus().homing);
+  device.position = 200;
+  play(driver.keepAlive(), std::ref(device));
+  play(driver.readStatus(), std::ref(device));
+  EXPECT_TRUE(driver.lastStatus().homing);
+  device.position = 5;  // its controller stands there
+  play(driver.keepAlive(), std::ref(device));
+  play(driver.readStatus(), std::ref(device));
+  EXPECT_FALSE(driver.lastStatus().homing);
+  device.position = 500;
+  play(driver.goHome(HomeTowards::kMin), std::ref(device));
+  play(driver.haltAndHold(), std::ref(device));
+  EXPECT_FALSE(driver.lastStatus().homing) << "a halt ends it";
+}
+
+TEST(LacActuator, SeesNoKillSwitch) {
+  AxisConfig axis = axisConfig();
+  axis.kill_switch = true;
+  EXPECT_FALSE(checkLacConfig(axis).ok());
+}
+
 TEST(LacActuator, TheTargetNeverLeadsByMoreThanTheTimeoutAtTheSetSpeed) {
   LacActuator driver(axisConfig());  // 5 mm/s for 200 ms is 1 mm, ten counts
   FakeLac device;

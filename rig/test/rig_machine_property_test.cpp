@@ -48,7 +48,7 @@ class RandomLife {
 
   void give() {
     RigCommand command;
-    command.kind = static_cast<RigCommand::Kind>(pick(12));
+    command.kind = static_cast<RigCommand::Kind>(pick(13));
     if (happens(0.4)) command.kind = RigCommand::Kind::kReset;
     if (happens(0.3)) command.kind = RigCommand::Kind::kEnable;
     if (happens(0.4)) command.kind = RigCommand::Kind::kRun;
@@ -86,6 +86,13 @@ TEST(RigMachineProperty, LimitsHoldInEveryTick) {
       const double drawn_m = loading_m(bench.position_m, bench.orders);
       ASSERT_LE(drawn_m, speedCap_m_per_s(limits) * 0.2 + 2.0 * limits.following_error_m) << place;
       if (drawn_m > 1e-9) ++loading_ticks;
+      double told_m_per_s = 0.0;
+      for (std::size_t i = 0; i < bench.position_m.size(); ++i) {
+        const bool draws =
+            bench.orders.targets_m[i] && *bench.orders.targets_m[i] > bench.position_m[i];
+        if (draws) told_m_per_s += bench.orders.speeds_m_per_s[i];
+      }
+      ASSERT_LE(told_m_per_s, speedCap_m_per_s(limits) * (1.0 + 1e-12)) << place;
       for (const auto& target : bench.orders.targets_m) {
         if (!target) continue;
         ASSERT_GE(*target, 0.0) << place;

@@ -63,25 +63,139 @@ TEST(RigMachineTest, AbsoluteForceHaltsInTheSameTickAndUnloads) {
 
 TEST(RigMachineTest, TareDoesNotMoveTheAbsoluteLimit) {
   MachineBench bench;
-  bench.extra_N = 0.9;
+  bench.extra_N = 0.04;
   bench.enable();
   ASSERT_EQ(bench.command(Kind::kTare), "");
   bench.steps(30);
-  EXPECT_NEAR(bench.machine.tares_N()[0], 0.9, 1e-12);
-  bench.extra_N = 6.01;  // 5.11 N against the tare
+  EXPECT_NEAR(bench.machine.tares_N()[0], 0.04, 1e-12);
+  EXPECT_EQ(bench.machine.purpose().how, "done");
+  bench.extra_N = 6.01;  // 5.97 N against the tare
   bench.step();
   EXPECT_TRUE(bench.orders.halt);
   EXPECT_TRUE(bench.hasFault("absolute-force"));
 }
 
 TEST(RigMachineTest, ALoadIsNoTare) {
+  for (const double load_N : {0.06, 1.5}) {  // from slack_N on
+    MachineBench bench;
+    bench.extra_N = load_N;
+    bench.enable();
+    bench.command(Kind::kTare);
+    bench.steps(30);
+    EXPECT_EQ(bench.countOf("tare-refused"), 1);
+    EXPECT_EQ(bench.machine.tares_N()[0], 0.0);
+    EXPECT_EQ(bench.machine.purpose().how, "refused");
+    EXPECT_THAT(bench.machine.purpose().why, HasSubstr("under load"));
+  }
+}
+
+TEST(RigMachineTest, WhatSwingsHasNoZero) {
   MachineBench bench;
-  bench.extra_N = 1.5;
   bench.enable();
   bench.command(Kind::kTare);
-  bench.steps(30);
-  EXPECT_EQ(bench.countOf("tare-refused"), 1);
-  EXPECT_EQ(bench.machine.tares_N()[0], 0.0);
+  for (int i = 0; i < 30; ++i) {
+    bench.extra_N = i % 2 == 0 ? 0.04 : -0.04;
+    bench.step();
+  }
+  EXPECT_EQ(bench.machine.purpose().how, "refused");
+  EXPECT_THAT(bench.machine.purpose().why, HasSubstr("not steady"));
+}
+
+TEST(RigMachineTest, AWrongSignIsNoSmallerAForce) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(1.0));
+  bench.extra_N = -6.5;
+  bench.step();
+  EXPECT_TRUE(bench.orders.halt);
+}
+
+TEST(RigMachineTest, AJogUnderAFaultNeedsItsOperator) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(1.0));
+  bench.tick.trip = ForceTrip{0, 7.0};
+  bench.step();
+  bench.steps(500);
+  ASSERT_EQ(bench.machine.state(), RigState::kFault);
+  ASSERT_EQ(bench.jog(0, -0.005), "");
+  bench.steps(5);
+  ASSERT_TRUE(bench.machine.busy());
+  bench.tick.operator_gone = true;
+  bench.step();
+  EXPECT_TRUE(bench.orders.halt);
+  EXPECT_FALSE(bench.machine.busy());
+  EXPECT_TRUE(bench.hasFault("lease-lost"));
+}
+
+TEST(RigMachineTest, UnloadingGoesOnWithoutItsOperator) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(2.0));
+  bench.tick.operator_gone = true;
+  bench.steps(500);
+  EXPECT_TRUE(bench.hasFault("lease-lost"));
+  EXPECT_EQ(bench.countOf("unloaded"), 1);
+  EXPECT_EQ(bench.countOf("not-unloaded"), 0);
+}
+
+TEST(RigMachineTest, UnloadingGoesOnThoughNothingCanBeWritten) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_EQ(bench.command(Kind::kAbort), "");
+  bench.steps(3);
+  bench.tick.recorder_fault = "no room";
+  bench.steps(500);
+  EXPECT_TRUE(bench.hasFault("not-written"));
+  EXPECT_EQ(bench.machine.state(), RigState::kFault);
+  EXPECT_EQ(bench.countOf("unloaded"), 1);
+  EXPECT_EQ(bench.countOf("not-unloaded"), 0);
+}
+
+TEST(RigMachineTest, WhatIsLostWhileARunIsPausedEndsIt) {
+  MachineBench bench;
+  bench.enable();
+  bench.run();
+  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_EQ(bench.command(Kind::kPause), "");
+  bench.steps(10);
+  bench.mute_axis = 1;
+  bench.steps(10);
+  EXPECT_EQ(bench.machine.state(), RigState::kFault);
+}
+
+TEST(RigMachineTest, SeveralJogsAreLetOutToWhereTheCordWasSlack) {
+  MachineBench bench;
+  bench.own_springs = true;
+  bench.enable();
+  for (int i = 0; i < 4; ++i) {  // 0.6 N in the end
+    ASSERT_EQ(bench.jog(0, 0.001), "");
+    ASSERT_TRUE(bench.reach(RigState::kReady));
+  }
+  ASSERT_GT(bench.force_N(0), 0.5);
+  ASSERT_EQ(bench.jog(0, 0.001), "");
+  bench.stale_cell = 0;
+  bench.steps(500);
+  EXPECT_LE(bench.force_N(0), 0.05);
+  EXPECT_EQ(bench.countOf("unloaded"), 0) << "nobody saw that it is";
+  EXPECT_EQ(bench.countOf("not-unloaded"), 1);
+}
+
+TEST(RigMachineTest, CurrentIsTakenAwayUntilItIsGone) {
+  MachineBench bench;
+  bench.enable();
+  bench.command(Kind::kDisable);
+  for (AxisInput& axis : bench.tick.axes) axis.energised = true;  // it did not come through
+  bench.step();
+  EXPECT_TRUE(bench.orders.deenergise);
+  for (AxisInput& axis : bench.tick.axes) axis.energised = false;
+  bench.step();
+  EXPECT_FALSE(bench.orders.deenergise);
 }
 
 TEST(RigMachineTest, AWatchBetweenTicksTripsThoughTheForceIsGone) {
@@ -110,9 +224,10 @@ TEST(RigMachineTest, AStaleCellStopsMotionAndUnloadsByTheOthersAndByPosition) {
   EXPECT_TRUE(bench.orders.halt);
   EXPECT_TRUE(bench.hasFault("silence"));
   bench.steps(1000);
-  EXPECT_EQ(bench.countOf("unloaded"), 1);
   EXPECT_LE(bench.force_N(1), 0.05);
   EXPECT_LE(bench.position_m[0], 0.01 + 1e-9);
+  EXPECT_EQ(bench.countOf("unloaded"), 0);
+  EXPECT_THAT(bench.machine.reason(), HasSubstr("cell-1 gives no tension"));
 }
 
 TEST(RigMachineTest, ACellThatIsBackInTimeLetsTheRunGoOn) {
@@ -155,6 +270,7 @@ TEST(RigMachineTest, AnOldSampleIsStale) {
 
 TEST(RigMachineTest, AnAxisThatDoesNotFollowIsAFaultAndWhatRemainsIsSaid) {
   MachineBench bench;
+  bench.own_springs = true;
   bench.enable();
   bench.run();
   ASSERT_TRUE(bench.loadUpTo(2.0));
@@ -164,6 +280,8 @@ TEST(RigMachineTest, AnAxisThatDoesNotFollowIsAFaultAndWhatRemainsIsSaid) {
   bench.steps(1000);
   EXPECT_EQ(bench.countOf("unloaded"), 0);
   EXPECT_EQ(bench.countOf("not-unloaded"), 1);
+  EXPECT_LE(bench.force_N(1), 0.05) << "the other cord is let out";
+  EXPECT_THAT(bench.machine.reason(), HasSubstr("axis-1 does not follow"));
 }
 
 TEST(RigMachineTest, AnAxisMayAnswerLateButNotForLong) {

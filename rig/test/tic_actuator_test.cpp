@@ -57,6 +57,19 @@ struct FakeTic {
   }
 };
 
+TEST(TicActuator, AnEmergencyStopThatItWouldNotSeeIsRefused) {
+  AxisConfig axis = axisConfig();
+  axis.kill_switch = true;
+  FakeTic device;
+  TicActuator blind(axis);
+  const ScriptRun refused = play(blind.start(), std::ref(device));
+  EXPECT_EQ(refused.end.fault, ActuatorFault::kRefused);
+  EXPECT_THAT(refused.end.detail, testing::HasSubstr("kill_switch"));
+  device.settings[0x5D] = 8;
+  TicActuator seeing(axis);
+  EXPECT_EQ(play(seeing.start(), std::ref(device)).end.fault, ActuatorFault::kNone);
+}
+
 std::vector<int> codesOf(const ScriptRun& run) {
   std::vector<int> codes;
   codes.reserve(run.sent.size());

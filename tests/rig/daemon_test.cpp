@@ -10,7 +10,9 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 
+#include "rpc_peer.h"
 #include "running_rig.h"
 #include "tenter/rig/redecide.h"
 #include "tenter/session/replay.h"
@@ -140,8 +142,8 @@ TEST(TenterdTest, RunsAProtocolIntoAWholeSession) { runsAWholeSession(true); }
 TEST(TenterdTest, DoesSoOnASerialBusToo) { runsAWholeSession(false); }
 
 TEST(TenterdTest, AForceBeyondTheLimitHaltsAllAxes) {
-  constexpr int kTrials = 5;
-  constexpr double kLimit_ms = 25.0;
+  constexpr int kTrials = 7;
+  constexpr double kLimit_ms = 25.0, kUsual_ms = 15.0;
   constexpr double kBeyond_N = 20.0;
   constexpr double kBeforeUnloading_s = 0.09;
   RunningRig running;
@@ -164,8 +166,9 @@ TEST(TenterdTest, AForceBeyondTheLimitHaltsAllAxes) {
   std::sort(times_ms.begin(), times_ms.end());
   std::printf("halted after %.1f ms (middle one of %d), %.1f ms (longest)\n", times_ms[kTrials / 2],
               kTrials, times_ms.back());
-  // The middle one: a shared machine may hold a single one up.
-  EXPECT_LE(times_ms[kTrials / 2], kLimit_ms);
+  EXPECT_LE(times_ms[kTrials / 2], kUsual_ms);
+  // Without real-time priority a shared machine may hold a single one up.
+  EXPECT_LE(times_ms[kTrials - 2], kLimit_ms);
 }
 
 TEST(TenterdTest, AnybodysStopHaltsAndAKilledDaemonIsOutlivedByTheDevicesTimeout) {
@@ -237,11 +240,53 @@ TEST(TenterdTest, ASecondTerminalPausesResumesAndAborts) {
   const Positions before = positions(running);
   EXPECT_TRUE(waitFor(5.0, [&] { return positions(running)[0] > before[0] + 100.0; }));
   EXPECT_EQ(running.tenterRig({"abort"}), 0);
-  EXPECT_EQ(RunningRig::wait(client), 0);
+  EXPECT_EQ(RunningRig::wait(client), 7) << "not what was asked for";
   EXPECT_THAT(logOf(session), HasSubstr("\"how\":\"aborted\""));
   EXPECT_THAT(logOf(session), HasSubstr("\"name\":\"unloaded\""));
   expectReplays(session);
   EXPECT_EQ(running.tenterRig({"abort"}), 7) << "nothing is under way";
+}
+
+TEST(TenterdTest, WhenItsTerminalGoesAPausedRunIsLetOut) {
+  RunningRig running;
+  const std::string protocol = running.write("all.toml", kAllAxes);
+  const std::string session = running.path("session");
+  const Positions home = positions(running);
+  const pid_t client = running.startTenterRig({"run", protocol, "-o", session});
+  ASSERT_TRUE(waitUntilAllPull(running, session));
+  ASSERT_EQ(running.tenterRig({"pause"}), 0);
+  EXPECT_EQ(running.endDaemon(SIGHUP), 0);
+  kill(client, SIGKILL);
+  RunningRig::wait(client);
+  EXPECT_THAT(logOf(session), HasSubstr("\"how\":\"aborted\""));
+  EXPECT_THAT(logOf(session), HasSubstr("\"name\":\"unloaded\""));
+  EXPECT_TRUE(verifySession(session)->closed);
+  EXPECT_LT(positions(running)[0], home[0] + 1000.0) << "the cords are let out";
+}
+
+TEST(TenterdTest, ALoadIsNoZeroAndTheExitCodeSaysSo) {
+  RunningRig running;
+  ASSERT_EQ(running.tenterRig({"home"}), 0);
+  EXPECT_EQ(running.tenterRig({"tare"}), 0);
+  running.rig().addForce(2, 2.0);
+  EXPECT_EQ(running.tenterRig({"tare"}), 7);
+  EXPECT_THAT(test_support::slurp(running.path("out")), HasSubstr("cell-3 is under load"));
+  EXPECT_EQ(running.status()["last"]["how"], "refused");
+}
+
+TEST(TenterdTest, TooManyClientsMayStillStop) {
+  RunningRig running;
+  const std::string protocol = running.write("all.toml", kAllAxes);
+  const pid_t client = running.startTenterRig({"run", protocol, "-o", running.path("one")});
+  ASSERT_TRUE(waitUntilAllPull(running, running.path("one")));
+  std::vector<std::unique_ptr<RpcPeer>> idle;
+  for (int i = 0; i < 40; ++i) {
+    idle.push_back(std::make_unique<RpcPeer>(running.socket()));
+    idle.back()->order("status");  // it is greeted
+  }
+  EXPECT_THAT(idle.back()->lastError(), HasSubstr("too many clients"));
+  EXPECT_EQ(running.tenterRig({"stop"}), 0);
+  EXPECT_EQ(RunningRig::wait(client), 7);
 }
 
 TEST(TenterdTest, AUserOutsideTheGroupIsRefused) {

@@ -55,8 +55,8 @@ TEST(DiskFullTest, StopsUnloadsAndSaysSo) {
   limitFiles(running.daemon(), RLIM_INFINITY);
   EXPECT_LT(drawn(), at_limit) << "the cords were let out";
   const std::string log = test_support::slurp(running.log());
-  EXPECT_THAT(log, HasSubstr("fault: session: not-written"));
-  EXPECT_THAT(log, HasSubstr("decision: unloaded"));
+  EXPECT_THAT(log, HasSubstr("\"fault\":\"not-written\""));
+  EXPECT_THAT(log, HasSubstr("\"name\":\"unloaded\""));
   const nlohmann::json status = running.status();
   EXPECT_EQ(status["state"], "fault");
   EXPECT_THAT(status["reason"].get<std::string>(), HasSubstr("not-written"));

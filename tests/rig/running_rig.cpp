@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "tenter/core/files.h"
 
@@ -58,9 +59,13 @@ void RunningRig::startDaemon(const std::string& preload) {
   }
 }
 
+int RunningRig::endDaemon(int signal) {
+  kill(daemon_, signal);
+  return wait(std::exchange(daemon_, 0));
+}
+
 RunningRig::~RunningRig() {
-  kill(daemon_, SIGKILL);
-  wait(daemon_);
+  if (daemon_ > 0) endDaemon(SIGKILL);
 }
 
 pid_t RunningRig::startTenterRig(const std::vector<std::string>& arguments) {

@@ -25,6 +25,8 @@ class RunningRig {
   /// Kills the daemon, if it still runs, and starts another one with a log of its own, and with a
   /// library before all others if one is named.
   void restartDaemon(const std::string& preload = "");
+  /// Sends it that, and waits until it has ended; its exit code.
+  int endDaemon(int signal);
   std::string log() const;  ///< The path of the daemon's log.
   std::string path(const std::string& name) const { return folder_ / name; }
   std::string socket() const { return folder_ / "tenterd.sock"; }

@@ -129,28 +129,46 @@ void ServedRig::addForce(int cell, double force_N) {
   added_N_.at(static_cast<std::size_t>(cell)) = force_N;
 }
 
-std::string ServedRig::configuration() const {
+std::string servedRigToml(const std::string& name, std::optional<double> slack_N,
+                          const std::vector<std::string>& addresses,
+                          const std::vector<int>& units) {
+  constexpr int kFirstPort = 15502;
   std::ostringstream toml;
-  const double slack_N = kSlackFactor * home_N_ + kSlack_N;
-  toml << "# SPDX-License-Identifier: CC0-1.0\nschema_version = 1\nname = \"virtual rig, "
-       << options_.mount.fabric << ", " << options_.mount.protocol
+  toml << "# SPDX-License-Identifier: CC0-1.0\nschema_version = 1\nname = \"" << name
        << "\"\n\n[limits]\nabsolute_N = 12.0\nworking_N = 10.0\n"
-       << "slack_N = " << slack_N << "\nslope_N_per_s = 60.0\nstiffest_sample_N_per_m = 1000.0\n"
+       << "slack_N = " << slack_N.value_or(kSlack_N)
+       << "\nslope_N_per_s = 60.0\nstiffest_sample_N_per_m = 1000.0\n"
        << "following_error_m = 0.001\n";
-  for (int i = 0; i < kAxes; ++i) {
-    const VirtualModbus& server = *servers_[options_.tcp ? static_cast<std::size_t>(i) : 0];
-    toml << "\n[[cell]]\nname = \"cell-" << number(i) << "\"\naddress = \"" << server.address()
-         << "\"\nunit = " << (options_.tcp ? 1 : i + 1) << "\nmap = \"" << kMap
-         << "\"\ncapacity_N = 50.0\nlowest_N = -1.0\n";
+  for (std::size_t i = 0; i < ServedRig::kAxes; ++i) {
+    toml << "\n[[cell]]\nname = \"cell-" << i + 1 << "\"\naddress = \"";
+    if (addresses.empty())
+      toml << "tcp:127.0.0.1:" << kFirstPort + i;
+    else
+      toml << addresses.at(i);
+    toml << "\"\nunit = " << (units.empty() ? 1 : units.at(i)) << "\nmap = \"" << kMap
+         << "\"\ncapacity_N = 50.0\nlowest_N = -0.05\n";
   }
-  for (int i = 0; i < kAxes; ++i) {
+  for (int i = 0; i < ServedRig::kAxes; ++i) {
     toml << "\n[[axis]]\nname = \"axis-" << number(i) << "\"\ndriver = \"tic\"\nserial = \""
-         << serialOf(i) << "\"\nmetres_per_unit = " << kMetresPerMicrostep
+         << serialOf(i) << "\"\nmetres_per_unit = " << ServedRig::kMetresPerMicrostep
          << "\ntravel_m = [0.0, 0.08]\nmax_speed_m_per_s = 0.004\n"
          << "max_acceleration_m_per_s2 = 0.1\ncell = \"cell-" << number(i) << "\"\n";
   }
-  if (cameras_) toml << cameras_->configuration();
   return toml.str();
+}
+
+std::string ServedRig::configuration() const {
+  std::vector<std::string> addresses;
+  std::vector<int> units;
+  for (int i = 0; i < kAxes; ++i) {
+    addresses.push_back(servers_[options_.tcp ? static_cast<std::size_t>(i) : 0]->address());
+    units.push_back(options_.tcp ? 1 : i + 1);
+  }
+  std::string toml =
+      servedRigToml("virtual rig, " + options_.mount.fabric + ", " + options_.mount.protocol,
+                    kSlackFactor * home_N_ + kSlack_N, addresses, units);
+  if (cameras_) toml += cameras_->configuration();
+  return toml;
 }
 
 }  // namespace tenter

@@ -16,7 +16,7 @@ constexpr std::uint16_t kFirmware = 0x0107;
 constexpr std::uint16_t kSupply_mV = 12'000, kLowSupply_mV = 4'100;
 constexpr std::chrono::milliseconds kSafeStartPardon = 200ms;
 constexpr std::uint8_t kVendorOut = 0x40, kVendorIn = 0xC0;
-constexpr std::uint8_t kSwitchOnPin = 1;
+constexpr std::uint8_t kSwitchOnPin = 1, kKillSwitchPin = 8;
 
 // The maker's defaults.
 constexpr std::uint16_t kDefaultTimeout_ms = 1000;
@@ -35,6 +35,7 @@ VirtualTic::VirtualTic(const VirtualActuatorSpec& spec)
   settings_[setting::kSoftErrorResponse] = kDecelerate;
   settings_[setting::kForwardLimitMap] = spec.forward_switch_units ? kSwitchOnPin : 0;
   settings_[setting::kReverseLimitMap] = spec.reverse_switch_units ? kSwitchOnPin : 0;
+  settings_[setting::kKillSwitchMap] = kKillSwitchPin;  // as the rig's builder sets it
   putLittleEndian(settings_, setting::kCommandTimeout_ms, 2, kDefaultTimeout_ms);
   putLittleEndian(settings_, setting::kMaxSpeed, 4, kDefaultMaxSpeed);
   putLittleEndian(settings_, setting::kMaxAcceleration, 4, kDefaultAcceleration);

@@ -67,7 +67,7 @@ std::vector<FaultKindRow> makeKinds() {
   kinds.push_back(cell("over-range", {"over-range", "absolute-force"}));
   // Slack cords cannot tell it: +3 mN and -3 mN are both noise.
   FaultKindRow flip = cell("sign-flip", {"sign-flip"});
-  flip.phases = {kHolding};
+  flip.phases = {kLoading, kHolding, kUnloading};
   kinds.push_back(flip);
   kinds.push_back(
       cell("word-swap", {"word-order", "over-range", "inconsistent", "not-a-number", "sign-flip"}));

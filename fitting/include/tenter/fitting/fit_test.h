@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,7 +37,8 @@ struct FitTestOptions {
 struct FrameOutcome {
   bool converged = false;
   bool stable = false;
-  bool proven = false;  ///< Stability was seen at the state itself, not at one near by.
+  bool proven = false;     ///< Stability was seen at the state itself, not at one near by.
+  bool cancelled = false;  ///< Stopped on the way (FitTest::cancelWhen): nothing is known of it.
   int newton_steps = 0;
   int factorizations = 0;
   std::string problem;  ///< Empty when all is well.
@@ -123,6 +125,9 @@ class FitTest {
   /// those of a near state stand in, which halves their number, also in derivatives: for the way,
   /// not for the end.
   virtual void requireProof(bool /*required*/) {}
+  /// Polled while an equilibrium is sought: true ends the search, and its outcome is `cancelled`.
+  /// Empty: none.
+  virtual void cancelWhen(std::function<bool()> /*cancelled*/) {}
   /// Compares the frame's last solved state with the one reached from the measured shape. Changes
   /// neither.
   virtual MultistabilityReport crossCheck(int frame);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tenter/inversion/certificate.h"
+#include "tenter/inversion/rest_preference.h"
 #include "tenter/inversion/sliding_proof.h"
 #include "tenter/inversion/softness_proof.h"
 
@@ -44,7 +45,10 @@ enum class RestKind {
 struct InversionOptions {
   InversionMethod method = InversionMethod::kDirect;
   RestKind rest = RestKind::kMesh;  ///< kMetric: kDirect only.
-  double time_budget_s = 0.0;       ///< 0: none.
+  /// Its share is halved, and at last left out, where nothing certified is found with it. kDirect
+  /// only.
+  RestPreference preference;
+  double time_budget_s = 0.0;  ///< 0: none.
   std::function<bool()> cancelled;
   std::function<void(const std::string& stage)> progress;
   int redrapes = 20;
@@ -61,6 +65,8 @@ struct InversionResult {
   Eigen::VectorXd rotations;
   Points3 contact_forces;  ///< 3 x contacts [N], on the shell.
   Certificate certificate;
+  RestPreference preference;  ///< With which this was found; its share may be less than was asked.
+  ShapeMeasures target_shape, rest_shape;
   std::optional<SlidingProof> proof;  ///< Of kInfeasible; or the next.
   std::optional<SoftnessProof> softness_proof;
   /// With it: multiples of all stiffness up to which no metric rest state exists, and one at which

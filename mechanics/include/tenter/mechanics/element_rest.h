@@ -8,8 +8,8 @@
 
 namespace tenter {
 
-/// Rest state of a shell of edges and raw hinges [Inv18] eq. 9, 10, element by element: a metric
-/// that no rest positions need have.
+/// Rest state of a shell of edges and hinges, element by element: a metric that no rest positions
+/// need have.
 struct ElementRest {
   Eigen::VectorXd length_m;   ///< L0 of every mesh edge.
   Eigen::VectorXd angle_rad;  ///< theta0 of every mesh edge; 0 on the border, where nothing bends.
@@ -23,5 +23,8 @@ std::unique_ptr<EnergyTerm> makeEdgeTerm(const SheetMesh& sheet,
 std::unique_ptr<EnergyTerm> makeRawHingeTerm(const SheetMesh& sheet,
                                              std::shared_ptr<const StrainLaw> law,
                                              const ElementRest& rest);
+/// As that without `rest`, whose angles stand in for the rest positions'; lengths do not matter.
+HingeTerm makeHingeTerm(const SheetMesh& sheet, std::shared_ptr<const StrainLaw> law,
+                        EdgeRotations rotations, int first_coordinate, const ElementRest& rest);
 
 }  // namespace tenter

@@ -71,7 +71,8 @@ Result<SeriesResult> reconstructImages(const std::vector<CameraView>& views,
                                        const std::vector<ImageSet>& sets,
                                        const SeriesOptions& options);
 
-/// A frame of a measurement from what was seen.
+/// A frame of a measurement from what was seen. A vertex whose covariance is not finite, or is
+/// negative on an axis, is not valid.
 MeasurementFrame measuredFrame(const ClothFrame& cloth, std::int64_t time_ns);
 
 /// Its figures.

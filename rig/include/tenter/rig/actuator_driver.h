@@ -28,6 +28,8 @@ struct AxisConfig {
   double max_acceleration_m_per_s2 = 0.0;
   /// Silence after which the device itself stops, or by which a target may lead.
   std::chrono::milliseconds command_timeout{200};
+  /// An emergency stop is wired to a pin of the device, which must be set to see it.
+  bool kill_switch = false;
   double full_speed_m_per_s = 0.0;  ///< LAC only: speed of the unloaded actuator at full power.
 };
 
@@ -117,6 +119,7 @@ struct ActuatorDriverRow {
   std::span<const UsbProduct> products;
   Result<void> (*check)(const AxisConfig& config);
   std::unique_ptr<ActuatorDriver> (*make)(const AxisConfig& config);
+  bool sees_kill_switch;  ///< It has an input for one: the default of AxisConfig::kill_switch.
 };
 
 std::span<const ActuatorDriverRow> actuatorDrivers();

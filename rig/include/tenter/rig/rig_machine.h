@@ -79,6 +79,15 @@ struct ForceTrip {
   double gross_N = 0.0;
 };
 
+/// What was asked for last, of what takes time, and how that ended.
+struct RigPurpose {
+  std::uint64_t number = 0;  ///< Counts them.
+  std::string what;          ///< As the command: "jog", "run", ...
+  std::string how;  ///< "done", "aborted", "stopped", "tripped", "refused", "not-unloaded"; empty
+                    ///< while it is under way.
+  std::string why;  ///< Unless done.
+};
+
 /// All that the machine knows of one moment.
 struct RigTick {
   std::int64_t time_ns = 0;  ///< Monotonic.
@@ -143,7 +152,14 @@ class RigMachine {
 
   RigState state() const { return state_; }
   const std::string& reason() const { return reason_; }
-  bool moving() const { return activity_ != Activity::kNone && state_ != RigState::kPaused; }
+  /// Something is under way, be it a tare or a run that is paused.
+  bool busy() const { return activity_ != Activity::kNone; }
+  bool moving() const { return busy() && state_ != RigState::kPaused; }
+  /// Cords are being let out, or will be once the axes stand.
+  bool unloading() const {
+    return activity_ == Activity::kSettle || activity_ == Activity::kUnload;
+  }
+  const RigPurpose& purpose() const { return purpose_; }
   bool running() const { return protocol_ != nullptr; }
   const std::vector<double>& tares_N() const { return tares_N_; }
   const RigConfig& config() const { return config_; }
@@ -162,12 +178,18 @@ class RigMachine {
   void watchAxes();
   void trip(const std::string& source, const std::string& fault, const std::string& text);
   void stop(const std::string& why, bool halt_needed);
+  void freeze(std::size_t axis);
+  void noteUnwritten();
+  void conclude(const std::string& how, const std::string& why);
+  void takeCurrentAway();
   void changeState(RigState to, const std::string& reason);
   void settleIdleState();
   void remember();
   bool axesFit() const;
   std::string doubt() const;
+  // rig_commands.cpp: what may be asked for
   void obey(const RigCommand& command);
+  void setOut(RigCommand::Kind kind);
   std::string refusalOf(const RigCommand& command) const;
   void carryOut(const RigCommand& command);
   std::string refusalOfHome() const;
@@ -179,6 +201,7 @@ class RigMachine {
   void act();
   void begin(Activity activity);
   void startUnloading();
+  void keepOrigins();
   void actJog();
   void actHome();
   bool homesAstray(std::size_t axis);
@@ -221,11 +244,15 @@ class RigMachine {
   double dt_s_ = 0.0;
   std::int64_t since_ns_ = 0;  ///< When the activity began.
   bool enabled_ = false, emergency_ = false, loading_ = false, recording_ = false;
-  std::vector<double> setpoints_m_, origins_m_;  ///< Origins: where the run began.
-  std::vector<std::optional<double>> goals_m_;   ///< Where this tick's motion is to end exactly.
-  std::vector<double> begun_m_;                  ///< Where the activity began.
-  std::vector<double> known_m_;                  ///< Last positions read.
-  std::vector<double> tares_N_, tare_sums_N_;
+  std::vector<double> setpoints_m_,
+      origins_m_;  ///< Origins: where cords were slack, or a run began.
+  std::vector<std::optional<double>> goals_m_;  ///< Where this tick's motion is to end exactly.
+  std::vector<double> begun_m_;                 ///< Where the activity began.
+  std::vector<double> known_m_;                 ///< Last positions read.
+  std::vector<double> tares_N_, tare_sums_N_, tare_lowest_N_, tare_highest_N_;
+  std::vector<bool> frozen_;  ///< Axes that do not follow while cords are let out.
+  bool disabling_ = false;    ///< Until no axis has current any more.
+  RigPurpose purpose_;
   std::optional<MappingCheck> mapping_;
   std::vector<MappingFinding> findings_;
   std::vector<bool> mapped_;

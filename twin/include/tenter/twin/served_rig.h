@@ -35,6 +35,12 @@ struct ServedRigOptions {
 
 class LiveSpecimen;
 
+/// rig.toml of the served rig without cameras. `slack_N`: nothing: of a cloth that weighs nothing.
+/// Cell i answers at addresses[i] as unit units[i]; empty: at places that nobody serves.
+std::string servedRigToml(const std::string& name, std::optional<double> slack_N = {},
+                          const std::vector<std::string>& addresses = {},
+                          const std::vector<int>& units = {});
+
 /// Eight virtual actuators and load cells behind their real protocols, and between them a sample of
 /// cloth on cords (MountedSpecimen says which actuator has which).
 class ServedRig {
