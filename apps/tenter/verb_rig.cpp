@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <array>
-#include <cstdio>
 #include <optional>
 
 #include "protocol_files.h"
+#include "rig_gauges.h"
 #include "rig_snap.h"
 #include "rig_visit.h"
 #include "verbs.h"
@@ -61,46 +61,13 @@ void declareCheckMapping(CLI::App& command, Options& o) {
   command.add_option("axes", o.axes, "Axes to try; without, all that have a cell");
 }
 
-std::string numberText(const Json& value, const char* unit) {
-  if (!value.is_number()) return std::string("- ") + unit;
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4f %s", value.get<double>(), unit);
-  return text;
-}
-
-std::string emergencyText(const Json& status) {
-  std::string blind;
-  for (const Json& axis : status.value("axes", Json::array())) {
-    if (!axis.value("kill_switch", false))
-      blind += (blind.empty() ? "" : ", ") + axis.value("name", "");
-  }
-  const std::string pressed = status.value("emergency_stop", false) ? "pressed" : "not pressed";
-  return blind.empty() ? pressed : pressed + "; not seen by " + blind;
-}
-
 Result<int> status(const Options& o, Console& console) {
   const auto client = RigClient::connect(o.socket->as<std::string>());
   if (!client) return client.error();
   const auto answer = (*client)->call("status");
   if (!answer) return answer.error();
   console.answer = *answer;
-  const std::string reason = answer->value("reason", "");
-  console.say("emergency stop: " + emergencyText(*answer));
-  console.say(answer->value("rig", "") + ": " + answer->value("state", "") +
-              (reason.empty() ? "" : " (" + reason + ")"));
-  for (const Json& axis : answer->value("axes", Json::array())) {
-    console.say("  " + axis.value("name", "") + "  " +
-                numberText(axis.value("position_m", Json()), "m") + "  " + axis.value("fault", ""));
-  }
-  for (const Json& cell : answer->value("cells", Json::array())) {
-    console.say("  " + cell.value("name", "") + "  " +
-                numberText(cell.value("net_N", Json()), "N") + "  " + cell.value("fault", ""));
-  }
-  for (const Json& camera : answer->value("cameras", Json::array())) {
-    console.say("  " + camera.value("name", "") + "  " + camera.value("serial", "") + "  " +
-                counted(camera.value("completed", std::size_t{0}), "frame") + "  " +
-                camera.value("fault", ""));
-  }
+  for (const std::string& line : gaugeLines(*answer)) console.say(line);
   return kDone;
 }
 
@@ -211,6 +178,7 @@ Verb rigVerb() {
   static const std::array kRows = {
       Verb{"status", "State, positions and tensions",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSocket, status); }},
+      rigGauges(),
       Verb{"stop", "Halt all axes at once; anybody may",
            [](CLI::App& c, Action& a) { setUpCommand<Options>(c, a, declareSocket, stop); }},
       Verb{"enable", "Give the motors current", setUpPlain<kEnable>},

@@ -439,15 +439,24 @@ void RigService::publish(const RigTick& tick) {
                           {"why", purpose.why}}},
                         {"emergency_stop", tick.emergency_stop},
                         {"recording", recorder_ != nullptr},
+                        {"limits",
+                         {{"absolute_N", config_.limits.absolute_N},
+                          {"working_N", config_.limits.working_N},
+                          {"slack_N", config_.limits.slack_N}}},
                         {"axes", nlohmann::json::array()},
                         {"cells", nlohmann::json::array()}};
   for (std::size_t i = 0; i < tick.axes.size(); ++i) {
     const AxisInput& axis = tick.axes[i];
-    status["axes"].push_back({{"name", config_.axes[i].device.name},
+    const RigAxis& known = config_.axes[i];
+    nlohmann::json cell;
+    if (known.cell) cell = config_.cells[static_cast<std::size_t>(*known.cell)].id;
+    status["axes"].push_back({{"name", known.device.name},
+                              {"cell", cell},
+                              {"travel_m", {known.device.travel_min_m, known.device.travel_max_m}},
                               {"position_m", numberOrNull(axis.position_m)},
                               {"energised", axis.energised},
                               {"homed", axis.position_certain},
-                              {"kill_switch", config_.axes[i].device.kill_switch},
+                              {"kill_switch", known.device.kill_switch},
                               {"fault", axis.fault}});
   }
   for (std::size_t i = 0; i < tick.cells.size(); ++i) {

@@ -2,6 +2,7 @@
 // What the machine does: jog, homing, tare, unloading, protocols.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "tenter/rig/rig_machine.h"
@@ -165,8 +166,8 @@ void RigMachine::actHome() {
   }
 }
 
-/// Only what is slack and steady has a zero: no further from the amplifier's own, or the one taken
-/// last, than what counts as slack. A load that became the zero would be invisible to unloading.
+/// Only what is slack and steady has a zero, no further from the amplifier's own than what counts
+/// as slack: a load that became the zero would be invisible to unloading.
 void RigMachine::actTare() {
   const auto refuse = [&](std::size_t cell, const std::string& why) {
     activity_ = Activity::kNone;
@@ -187,9 +188,12 @@ void RigMachine::actTare() {
     tares_N.push_back(tare_sums_N_[i] / kTareTicks);
     if (tare_highest_N_[i] - tare_lowest_N_[i] > kUnsteadyShare * config_.limits.slack_N)
       return refuse(i, "is not steady");
-    if (std::min(std::abs(tares_N[i]), std::abs(tares_N[i] - tares_N_[i])) >
-        config_.limits.slack_N) {
-      return refuse(i, "is under load: unload first");
+    if (std::abs(tares_N[i]) > config_.limits.slack_N) {
+      char text[96];
+      std::snprintf(text, sizeof text,
+                    "is under load (%.3f N against its zero): unload it, or calibrate the cell",
+                    tares_N[i]);
+      return refuse(i, text);
     }
   }
   activity_ = Activity::kNone;

@@ -65,7 +65,7 @@ Result<pid_t> VirtualUsb::spawn(const std::vector<std::string>& arguments,
   posix_spawn_file_actions_init(&files);
   if (!output.empty()) {
     posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, output.c_str(),
-                                     O_WRONLY | O_CREAT | O_TRUNC, 0600);
+                                     O_WRONLY | O_CREAT | O_TRUNC | O_APPEND, 0600);
     posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
   }
   pid_t child = 0;

@@ -75,10 +75,6 @@ class Trial {
   }
 
   Verdict run() {
-    if (kind_.name == "disk-full") {
-      rig_.restart();  // the limit counts for the log too, so it begins anew
-      rig_.recover();
-    }
     rig_.truth().forget();
     rig_.enter(phase_, verdict_.injection.device);
     std::this_thread::sleep_for(std::chrono::duration<double>(verdict_.injection.delay_s));
@@ -145,6 +141,8 @@ class Trial {
       kill(daemon, SIGSTOP);
       std::this_thread::sleep_for(std::chrono::duration<double>(observed_s()));
     } else if (kind_.name == "disk-full") {
+      fs::resize_file(rig_.running().log(), 0);  // the limit counts for the log too
+      log_begin_ = 0;
       limitFiles(fs::file_size(rig_.session() + "/journal.jsonl"));
       rig_.stay(observed_s(), true, watch);
     } else if (kind_.name == "disk-read-only") {
