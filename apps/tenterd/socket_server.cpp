@@ -29,17 +29,36 @@ constexpr std::size_t kLongestLine_bytes = std::size_t{1} << 20;
 /// Beyond so many clients those that come may only stop the rig, and beyond twice as many nothing.
 constexpr std::size_t kMaxConnections = 32;
 constexpr int kPoll_ms = 100;
-/// After each answer a client is not heard for so long, or for so many times the processor time
-/// that its request took: however many and however long requests are, the watch gets its turn.
-constexpr std::chrono::nanoseconds kLeastPause = std::chrono::milliseconds(10),
+/// Processor time that one client's requests may take: a fiftieth of the time, and so much at once.
+/// Then it is not heard until it has that again, so that however many and however long requests
+/// are, the watch gets its turn.
+constexpr int kTimePerWork = 50;
+constexpr std::chrono::nanoseconds kWorkAtOnce = std::chrono::milliseconds(50),
                                    kLongestPause = std::chrono::seconds(1);
-constexpr int kPauseFactor = 20;
 
 std::chrono::nanoseconds threadTime() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
 }
+
+/// Of the thread that it is used in.
+class WorkBudget {
+ public:
+  void pauseIfSpent() {
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::nanoseconds work = threadTime();
+    left_ = std::min(left_ + (now - last_) / kTimePerWork - (work - last_work_), kWorkAtOnce);
+    last_ = now;
+    last_work_ = work;
+    if (left_ < left_.zero())
+      std::this_thread::sleep_for(std::min(-kTimePerWork * left_, kLongestPause));
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  std::chrono::nanoseconds last_work_ = threadTime(), left_ = kWorkAtOnce;
+};
 
 Error socketError(const fs::path& path, const std::string& what) {
   return Error{ErrorKind::kBadInput, path.string(), "", what + ": " + std::strerror(errno), ""};
@@ -192,6 +211,7 @@ void SocketServer::serve(Connection& connection, const Client& client) {
 void SocketServer::converse(Connection& connection, const Client& client) {
   std::string pending;
   std::array<char, 4096> chunk{};
+  WorkBudget budget;
   bool open = true;
   while (open) {
     const ssize_t n = recv(connection.descriptor, chunk.data(), chunk.size(), 0);
@@ -199,7 +219,6 @@ void SocketServer::converse(Connection& connection, const Client& client) {
     pending.append(chunk.data(), static_cast<std::size_t>(n));
     for (auto end = pending.find('\n'); open && end != std::string::npos;
          end = pending.find('\n')) {
-      const std::chrono::nanoseconds begun = threadTime();
       std::vector<Descriptor> attached;
       std::string answer = rpc_.answer(std::string_view(pending).substr(0, end), client, attached);
       pending.erase(0, end + 1);
@@ -207,8 +226,7 @@ void SocketServer::converse(Connection& connection, const Client& client) {
         answer += '\n';
         open = sendAll(connection.descriptor, answer, attached);
       }
-      std::this_thread::sleep_for(
-          std::clamp(kPauseFactor * (threadTime() - begun), kLeastPause, kLongestPause));
+      budget.pauseIfSpent();
     }
     if (pending.size() > kLongestLine_bytes) break;
   }

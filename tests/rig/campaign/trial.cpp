@@ -84,6 +84,9 @@ class Trial {
     if (state == "fault" || state == "stopped" || state == "off") {
       throw std::runtime_error("halted before the injection: " + before.value("reason", ""));
     }
+    // On a busy machine the cords are slack before anything could befall their unloading.
+    if (!rig_.session().empty() && !before.value("recording", false))
+      throw std::runtime_error("the run was over before the injection");
     log_begin_ = fs::file_size(rig_.running().log());
     begun_ns_ = monotonic_ns();
     kind_.part == Part::kProgram ? befallProgram() : befallDevice();
