@@ -143,7 +143,7 @@ TEST(TenterdTest, DoesSoOnASerialBusToo) { runsAWholeSession(false); }
 
 TEST(TenterdTest, AForceBeyondTheLimitHaltsAllAxes) {
   constexpr int kTrials = 7;
-  constexpr double kLimit_ms = 25.0, kUsual_ms = 15.0;
+  constexpr double kLimit_ms = 25.0, kHeldUp_ms = 60.0;
   constexpr double kBeyond_N = 20.0;
   constexpr double kBeforeUnloading_s = 0.09;
   RunningRig running;
@@ -166,9 +166,9 @@ TEST(TenterdTest, AForceBeyondTheLimitHaltsAllAxes) {
   std::sort(times_ms.begin(), times_ms.end());
   std::printf("halted after %.1f ms (middle one of %d), %.1f ms (longest)\n", times_ms[kTrials / 2],
               kTrials, times_ms.back());
-  EXPECT_LE(times_ms[kTrials / 2], kUsual_ms);
-  // Without real-time priority a shared machine may hold a single one up.
-  EXPECT_LE(times_ms[kTrials - 2], kLimit_ms);
+  // Without real-time priority a shared machine may hold a single one up, but not for long.
+  EXPECT_LE(times_ms[kTrials / 2], kLimit_ms);
+  EXPECT_LE(times_ms.back(), kHeldUp_ms);
 }
 
 TEST(TenterdTest, AnybodysStopHaltsAndAKilledDaemonIsOutlivedByTheDevicesTimeout) {
