@@ -76,8 +76,11 @@ Points3 faired(const TriangleMesh& mesh, double length_m) {
       std::pow(length_m, 4) * (k.transpose() * area.cwiseInverse().asDiagonal() * k);
   for (int v = 0; v < n; ++v) system.coeffRef(v, v) += area[v];
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors(system);
+  if (factors.info() != Eigen::Success) return mesh.positions;
   const Eigen::MatrixXd right = area.asDiagonal() * mesh.positions.transpose();
-  return factors.solve(right).transpose();
+  Points3 out = factors.solve(right).transpose();
+  if (!out.allFinite()) return mesh.positions;
+  return out;
 }
 
 Eigen::VectorXd fairedAngles(const InverseShell& shell, double smoothing_length_m) {

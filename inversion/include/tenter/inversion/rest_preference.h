@@ -24,7 +24,8 @@ struct RestPreference {
 inline constexpr double kSmoothing = 0.03;
 
 /// The surface of least sum of M |x - x0|^2 + length^4 |mean curvature|^2: folds shorter than 2 pi
-/// `length` go, flat and gently curved parts stay.
+/// `length` go, flat and gently curved parts stay. The mesh as it is, where its triangles are too
+/// thin for that.
 Points3 faired(const TriangleMesh& mesh, double length_m);
 
 /// Rest angles that are wished for, one a mesh edge [rad]; 0 on the border.
