@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A seeded campaign of faults against the daemon on a virtual rig; one JSON line an injection.
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
+#include <optional>
+#include <thread>
 
 #include "tenter/twin/virtual_usb.h"
 #include "trial.h"
@@ -41,8 +44,13 @@ int run(const Options& o) {
   const bool tcp = o.modbus == "tcp";
   TrialRig trial(tcp);
   int bad = 0;
+  std::optional<Injection> last;
   for (const Injection& injection : makePlan(o.seed, o.count, o.shard, o.shards, tcp)) {
     if (!o.only.empty() && injection.kind->name != o.only) continue;
+    // The daemon names the same again only after a second of quiet.
+    if (last && last->kind == injection.kind && last->device == injection.device)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+    last = injection;
     const Verdict verdict = attempt(trial, injection);
     std::printf("%s\n", verdict.json().dump().c_str());
     std::fflush(stdout);
