@@ -172,8 +172,7 @@ Result<int> RigVisit::ended(const Json& before, const Json& status) {
   console_.answer["state"] = state;
   console_.answer["reason"] = reason;
   const Json last = status.value("last", Json::object());
-  const bool took_time =
-      last != Json::object() && numberOf(last) != numberOf(before.value("last", Json::object()));
+  const bool took_time = numberOf(last) != numberOf(before.value("last", Json::object()));
   if (took_time) {
     const std::string how = last.value("how", "");
     console_.answer["how"] = how;

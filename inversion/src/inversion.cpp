@@ -350,23 +350,23 @@ Result<InversionResult> invertWithPreference(const InversionProblem& problem,
                                              const InversionOptions& options,
                                              const InverseShell& shell) {
   InversionOptions now = options;
-  InversionResult sum;
-  for (int k = 0; k <= kHalvings; ++k) {
-    if (k == kHalvings) now.preference = {};
-    now.explain = options.explain && k == kHalvings;
+  InversionResult before;
+  for (int k = 0;; ++k) {
+    const bool last = k == kHalvings;
+    if (last) now.preference = {};
+    now.explain = options.explain && last;
     auto result = Inverter(problem, now, shell).run();
     if (!result) return result;
-    result->seconds += sum.seconds;
-    result->solve_cpu_seconds += sum.solve_cpu_seconds;
-    result->forces_cpu_seconds += sum.forces_cpu_seconds;
-    result->factorizations += sum.factorizations;
-    if (result->status != InversionStatus::kNotConverged || k == kHalvings) return result;
-    sum = std::move(result).value();
+    result->seconds += before.seconds;
+    result->solve_cpu_seconds += before.solve_cpu_seconds;
+    result->forces_cpu_seconds += before.forces_cpu_seconds;
+    result->factorizations += before.factorizations;
+    if (last || result->status != InversionStatus::kNotConverged) return result;
+    before = std::move(result).value();
     now.preference.share *= 0.5;
     if (options.time_budget_s > 0.0)
-      now.time_budget_s = std::max(options.time_budget_s - sum.seconds, kLeastBudget_s);
+      now.time_budget_s = std::max(options.time_budget_s - before.seconds, kLeastBudget_s);
   }
-  return sum;
 }
 
 }  // namespace

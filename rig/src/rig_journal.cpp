@@ -75,7 +75,8 @@ RecordBody RigJournal::memoryRecord(const RigMemory& memory, std::int64_t zero_n
                                                      {"known_m", memory.known_m},
                                                      {"felt_ns", felt},
                                                      {"tares_N", memory.tares_N},
-                                                     {"mapped", memory.mapped}})};
+                                                     {"mapped", memory.mapped},
+                                                     {"origins_m", memory.origins_m}})};
 }
 
 std::vector<RecordBody> RigJournal::tickRecords(const RigTick& tick) {

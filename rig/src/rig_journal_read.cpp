@@ -128,6 +128,8 @@ Result<void> RigJournalReader::takeMemory(const JournalRecord& record, const std
   memory.known_m = readNumbers(in, "known_m", axes);
   memory.tares_N = readNumbers(in, "tares_N", cells);
   memory.mapped = readMapped(in, axes);
+  // Older sessions do not have it: their runs began where the axes stood.
+  memory.origins_m = in.has("origins_m") ? readNumbers(in, "origins_m", axes) : memory.known_m;
   if (!in.ok()) return in.error();
   memory_ = std::move(memory);
   return {};

@@ -55,7 +55,8 @@ RigMachine::RigMachine(RigConfig config)
 RigMachine::RigMachine(RigConfig config, const RigMemory& memory) : RigMachine(std::move(config)) {
   require(memory.axes.size() == axes_.size() && memory.heard_ns.size() == axes_.size() &&
               memory.known_m.size() == axes_.size() && memory.felt_ns.size() == felt_ns_.size() &&
-              memory.tares_N.size() == tares_N_.size() && memory.mapped.size() == mapped_.size(),
+              memory.tares_N.size() == tares_N_.size() && memory.mapped.size() == mapped_.size() &&
+              memory.origins_m.size() == origins_m_.size(),
           "RigMachine: a memory of this rig");
   state_ = memory.state;
   reason_ = memory.reason;
@@ -69,11 +70,12 @@ RigMachine::RigMachine(RigConfig config, const RigMemory& memory) : RigMachine(s
   felt_ns_ = memory.felt_ns;
   tares_N_ = memory.tares_N;
   mapped_ = memory.mapped;
+  origins_m_ = memory.origins_m;
 }
 
 RigMemory RigMachine::memory() const {
-  return {state_, reason_,   enabled_, emergency_, blind_,   last_ns_,
-          axes_,  heard_ns_, known_m_, felt_ns_,   tares_N_, mapped_};
+  return {state_,    reason_,  enabled_, emergency_, blind_,  last_ns_,  axes_,
+          heard_ns_, known_m_, felt_ns_, tares_N_,   mapped_, origins_m_};
 }
 
 RigOrders RigMachine::step(const RigTick& tick) {
@@ -144,7 +146,7 @@ bool RigMachine::axesFit() const {
 
 void RigMachine::watch() {
   if (tick_->emergency_stop && !emergency_) {
-    const bool was_moving = activity_ != Activity::kNone && activity_ != Activity::kTare;
+    const bool was_moving = inMotion();
     stop("emergency stop", true);
     if (was_moving) decide("not-unloaded", R"({"why":"emergency stop"})");
   }
@@ -227,9 +229,16 @@ bool RigMachine::strays(std::size_t axis) const {
          beyond_m > begun_beyond_m + allowed_m;
 }
 
+/// An axis that does not let its cord out, but does not draw it in either: no reason to halt the
+/// others, which do.
+bool RigMachine::staysBehind(std::size_t axis) const {
+  return activity_ == Activity::kUnload && known_m_[axis] > setpoints_m_[axis] &&
+         known_m_[axis] <= begun_m_[axis] + config_.limits.following_error_m;
+}
+
 /// Also while a run is paused: what is lost then pulls on unseen.
 void RigMachine::watchAxes() {
-  if (activity_ == Activity::kNone || activity_ == Activity::kTare) return;
+  if (!inMotion()) return;
   const bool follows = activity_ == Activity::kJog || activity_ == Activity::kRun ||
                        activity_ == Activity::kUnload || activity_ == Activity::kMap;
   for (std::size_t i = 0; i < config_.axes.size(); ++i) {
@@ -238,26 +247,13 @@ void RigMachine::watchAxes() {
     const bool lost = !axis.position_m || !axis.energised || !axis.fault.empty();
     if (lost && activity_ == Activity::kUnload) continue;  // the others still unload
     if (lost) return trip(name, axis.fault.empty() ? "no-current" : axis.fault, "");
-    if (follows && strays(i) && activity_ == Activity::kUnload) {
-      freeze(i);  // the others still unload
-      continue;
-    }
-    if (follows && strays(i)) {
-      return trip(name, "following-error",
-                  "is at " + std::to_string(*axis.position_m) + " m instead of " +
-                      std::to_string(setpoints_m_[i]) + " m");
-    }
+    if (!follows || !strays(i)) continue;
+    const std::string where = "is at " + std::to_string(known_m_[i]) + " m instead of " +
+                              std::to_string(setpoints_m_[i]) + " m";
+    if (!staysBehind(i)) return trip(name, "following-error", where);
+    if (!frozen_[i]) orders_->records.emplace_back(FaultEvent{name, "following-error", where});
+    frozen_[i] = true;
   }
-}
-
-/// It stays where it is while the other cords are let out.
-void RigMachine::freeze(std::size_t axis) {
-  if (frozen_[axis]) return;
-  frozen_[axis] = true;
-  orders_->records.emplace_back(FaultEvent{config_.axes[axis].device.name, "following-error",
-                                           "is at " + std::to_string(known_m_[axis]) +
-                                               " m instead of " +
-                                               std::to_string(setpoints_m_[axis]) + " m"});
 }
 
 void RigMachine::trip(const std::string& source, const std::string& fault,
@@ -271,7 +267,7 @@ void RigMachine::trip(const std::string& source, const std::string& fault,
     if (activity_ != Activity::kSettle) activity_ = Activity::kNone;  // what settles still unloads
     return;
   }
-  const bool was_moving = activity_ != Activity::kNone && activity_ != Activity::kTare;
+  const bool was_moving = inMotion();
   const bool was_unloading = activity_ == Activity::kUnload;
   endRun(fault);
   loading_ = false;

@@ -146,6 +146,12 @@ class MachineBench {
     command(RigCommand::Kind::kEnable);
     steps(2);
   }
+  /// Enabled, and a run has this much force.
+  bool pulls(double force) {
+    enable();
+    run();
+    return loadUpTo(force);
+  }
   void steps(int count) {
     for (int i = 0; i < count; ++i) step();
   }

@@ -44,9 +44,7 @@ TEST(RigMachineTest, ForceEndsAreMetWithinOneTickOfTravel) {
 
 TEST(RigMachineTest, AbsoluteForceHaltsInTheSameTickAndUnloads) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   bench.extra_N = 5.0;
   bench.step();
   EXPECT_TRUE(bench.orders.halt);
@@ -103,9 +101,7 @@ TEST(RigMachineTest, WhatSwingsHasNoZero) {
 
 TEST(RigMachineTest, AWrongSignIsNoSmallerAForce) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(1.0));
+  ASSERT_TRUE(bench.pulls(1.0));
   bench.extra_N = -6.5;
   bench.step();
   EXPECT_TRUE(bench.orders.halt);
@@ -113,9 +109,7 @@ TEST(RigMachineTest, AWrongSignIsNoSmallerAForce) {
 
 TEST(RigMachineTest, AJogUnderAFaultNeedsItsOperator) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(1.0));
+  ASSERT_TRUE(bench.pulls(1.0));
   bench.tick.trip = ForceTrip{0, 7.0};
   bench.step();
   bench.steps(500);
@@ -132,9 +126,7 @@ TEST(RigMachineTest, AJogUnderAFaultNeedsItsOperator) {
 
 TEST(RigMachineTest, UnloadingGoesOnWithoutItsOperator) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   bench.tick.operator_gone = true;
   bench.steps(500);
   EXPECT_TRUE(bench.hasFault("lease-lost"));
@@ -144,9 +136,7 @@ TEST(RigMachineTest, UnloadingGoesOnWithoutItsOperator) {
 
 TEST(RigMachineTest, UnloadingGoesOnThoughNothingCanBeWritten) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   ASSERT_EQ(bench.command(Kind::kAbort), "");
   bench.steps(3);
   bench.tick.recorder_fault = "no room";
@@ -159,9 +149,7 @@ TEST(RigMachineTest, UnloadingGoesOnThoughNothingCanBeWritten) {
 
 TEST(RigMachineTest, WhatIsLostWhileARunIsPausedEndsIt) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   ASSERT_EQ(bench.command(Kind::kPause), "");
   bench.steps(10);
   bench.mute_axis = 1;
@@ -186,6 +174,32 @@ TEST(RigMachineTest, SeveralJogsAreLetOutToWhereTheCordWasSlack) {
   EXPECT_EQ(bench.countOf("not-unloaded"), 1);
 }
 
+TEST(RigMachineTest, AMachineWithItsMemoryLetsOutToTheSamePlace) {
+  MachineBench bench;
+  bench.own_springs = true;
+  bench.enable();
+  ASSERT_EQ(bench.jog(0, 0.002), "");  // taut from 1 mm on
+  ASSERT_TRUE(bench.reach(RigState::kReady));
+  RigMachine again(bench.machine.config(), bench.machine.memory());
+  RigCommand run;
+  run.kind = Kind::kRun;
+  run.protocol =
+      std::make_shared<CaptureProtocol>(*parseCaptureProtocol(benchProtocolToml(), "p.toml"));
+  run.mapping = RigCommand::Mapping::kCheck;
+  bench.tick.commands.push_back(run);
+  for (int i = 0; i < 300; ++i) {
+    if (i == 5) bench.stale_cell = 0;
+    const std::vector<RigCommand> commands = bench.tick.commands;
+    bench.step();
+    RigTick tick = bench.tick;
+    tick.commands = commands;
+    ASSERT_EQ(again.step(tick).targets_m, bench.orders.targets_m) << i;
+  }
+  EXPECT_TRUE(bench.hasFault("silence"));
+  EXPECT_LE(bench.position_m[0], 0.01 + 1e-9) << "to where the cord was slack, before the jog";
+  EXPECT_EQ(again.reason(), bench.machine.reason());
+}
+
 TEST(RigMachineTest, CurrentIsTakenAwayUntilItIsGone) {
   MachineBench bench;
   bench.enable();
@@ -200,9 +214,7 @@ TEST(RigMachineTest, CurrentIsTakenAwayUntilItIsGone) {
 
 TEST(RigMachineTest, AWatchBetweenTicksTripsThoughTheForceIsGone) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(1.0));
+  ASSERT_TRUE(bench.pulls(1.0));
   bench.tick.trip = ForceTrip{1, 7.5};
   bench.step();
   EXPECT_TRUE(bench.orders.halt);
@@ -211,9 +223,7 @@ TEST(RigMachineTest, AWatchBetweenTicksTripsThoughTheForceIsGone) {
 
 TEST(RigMachineTest, AStaleCellStopsMotionAndUnloadsByTheOthersAndByPosition) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   bench.stale_cell = 0;
   for (int i = 0; i < 5; ++i) {  // 100 ms
     bench.step();
@@ -232,9 +242,7 @@ TEST(RigMachineTest, AStaleCellStopsMotionAndUnloadsByTheOthersAndByPosition) {
 
 TEST(RigMachineTest, ACellThatIsBackInTimeLetsTheRunGoOn) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(1.0));
+  ASSERT_TRUE(bench.pulls(1.0));
   bench.stale_cell = 0;
   bench.steps(3);
   bench.stale_cell = -1;
@@ -244,9 +252,7 @@ TEST(RigMachineTest, ACellThatIsBackInTimeLetsTheRunGoOn) {
 
 TEST(RigMachineTest, ASecondFaultBesideTheFirstDoesNotKeepTheOthersLoaded) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   bench.tick.trip = ForceTrip{0, 7.0};
   bench.tick.axes[1].fault = "stall";
   bench.step();
@@ -271,9 +277,7 @@ TEST(RigMachineTest, AnOldSampleIsStale) {
 TEST(RigMachineTest, AnAxisThatDoesNotFollowIsAFaultAndWhatRemainsIsSaid) {
   MachineBench bench;
   bench.own_springs = true;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   bench.stuck = 0;
   bench.steps(100);
   EXPECT_TRUE(bench.hasFault("following-error"));
@@ -284,11 +288,26 @@ TEST(RigMachineTest, AnAxisThatDoesNotFollowIsAFaultAndWhatRemainsIsSaid) {
   EXPECT_THAT(bench.machine.reason(), HasSubstr("axis-1 does not follow"));
 }
 
+TEST(RigMachineTest, AnAxisThatDrawsInWhileCordsAreLetOutHaltsAll) {
+  MachineBench bench;
+  bench.own_springs = true;
+  ASSERT_TRUE(bench.pulls(2.0));
+  ASSERT_EQ(bench.command(Kind::kAbort), "");
+  bench.steps(8);
+  bench.stuck = 0;
+  for (int i = 0; i < 20 && !bench.orders.halt; ++i) {
+    bench.position_m[0] += 1e-4;
+    bench.step();
+  }
+  EXPECT_TRUE(bench.orders.halt);
+  EXPECT_TRUE(bench.hasFault("following-error"));
+  EXPECT_FALSE(bench.machine.busy());
+  EXPECT_THAT(bench.machine.reason(), HasSubstr("axis-1"));
+}
+
 TEST(RigMachineTest, AnAxisMayAnswerLateButNotForLong) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(1.0));
+  ASSERT_TRUE(bench.pulls(1.0));
   bench.mute_axis = 1;
   bench.steps(5);  // 100 ms
   EXPECT_EQ(bench.machine.state(), RigState::kRunning);
@@ -299,9 +318,7 @@ TEST(RigMachineTest, AnAxisMayAnswerLateButNotForLong) {
 
 TEST(RigMachineTest, ForceSlopeIsBounded) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(1.0));
+  ASSERT_TRUE(bench.pulls(1.0));
   bench.extra_N = 3.5;  // below the working force
   bench.steps(6);
   EXPECT_TRUE(bench.hasFault("force-slope"));
@@ -346,9 +363,7 @@ TEST(RigMachineTest, BeyondTravelOnlyTheWayBackIsOpen) {
 
 TEST(RigMachineTest, PauseHoldsAndResumeGoesOn) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(1.0));
+  ASSERT_TRUE(bench.pulls(1.0));
   ASSERT_EQ(bench.command(Kind::kPause), "");
   bench.steps(3);
   const auto held_m = bench.position_m;
@@ -373,9 +388,7 @@ TEST(RigMachineTest, ResumedProtocolsEnd) {
 
 TEST(RigMachineTest, AbortUnloadsAndIsReadyAgain) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   ASSERT_EQ(bench.command(Kind::kAbort), "");
   EXPECT_TRUE(bench.orders.halt);
   EXPECT_FALSE(bench.orders.run_ended) << "unloading belongs to the session";
@@ -386,9 +399,7 @@ TEST(RigMachineTest, AbortUnloadsAndIsReadyAgain) {
 
 TEST(RigMachineTest, EmergencyStopIsObeyedUntilReleasedAndReset) {
   MachineBench bench;
-  bench.enable();
-  bench.run();
-  ASSERT_TRUE(bench.loadUpTo(2.0));
+  ASSERT_TRUE(bench.pulls(2.0));
   bench.tick.emergency_stop = true;
   bench.step();
   EXPECT_TRUE(bench.orders.halt);

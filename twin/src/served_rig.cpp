@@ -139,13 +139,12 @@ std::string servedRigToml(const std::string& name, std::optional<double> slack_N
        << "slack_N = " << slack_N.value_or(kSlack_N)
        << "\nslope_N_per_s = 60.0\nstiffest_sample_N_per_m = 1000.0\n"
        << "following_error_m = 0.001\n";
-  for (std::size_t i = 0; i < ServedRig::kAxes; ++i) {
-    toml << "\n[[cell]]\nname = \"cell-" << i + 1 << "\"\naddress = \"";
-    if (addresses.empty())
-      toml << "tcp:127.0.0.1:" << kFirstPort + i;
-    else
-      toml << addresses.at(i);
-    toml << "\"\nunit = " << (units.empty() ? 1 : units.at(i)) << "\nmap = \"" << kMap
+  for (int i = 0; i < ServedRig::kAxes; ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    const std::string address =
+        addresses.empty() ? "tcp:127.0.0.1:" + std::to_string(kFirstPort + i) : addresses.at(place);
+    toml << "\n[[cell]]\nname = \"cell-" << number(i) << "\"\naddress = \"" << address
+         << "\"\nunit = " << (units.empty() ? 1 : units.at(place)) << "\nmap = \"" << kMap
          << "\"\ncapacity_N = 50.0\nlowest_N = -0.05\n";
   }
   for (int i = 0; i < ServedRig::kAxes; ++i) {

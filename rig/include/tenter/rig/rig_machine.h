@@ -132,7 +132,8 @@ struct RigMemory {
   std::vector<double> known_m;                        ///< Last positions read.
   std::vector<std::int64_t> felt_ns;                  ///< Of each cell, its last tension.
   std::vector<double> tares_N;
-  std::vector<bool> mapped;  ///< Axes whose own cell was seen to answer.
+  std::vector<bool> mapped;       ///< Axes whose own cell was seen to answer.
+  std::vector<double> origins_m;  ///< Where cords were slack.
 };
 
 /// The safety state machine with the runner of protocols inside: pure, so that equal ticks give
@@ -171,6 +172,8 @@ class RigMachine {
  private:
   enum class Activity { kNone, kSettle, kJog, kHome, kRun, kUnload, kTare, kMap };
 
+  /// Motors are at work, or stand by for a run that is paused.
+  bool inMotion() const { return busy() && activity_ != Activity::kTare; }
   // rig_machine.cpp: what must not be
   void watch();
   void watchForces();
@@ -178,7 +181,7 @@ class RigMachine {
   void watchAxes();
   void trip(const std::string& source, const std::string& fault, const std::string& text);
   void stop(const std::string& why, bool halt_needed);
-  void freeze(std::size_t axis);
+  bool staysBehind(std::size_t axis) const;
   void noteUnwritten();
   void conclude(const std::string& how, const std::string& why);
   void takeCurrentAway();
@@ -244,8 +247,8 @@ class RigMachine {
   double dt_s_ = 0.0;
   std::int64_t since_ns_ = 0;  ///< When the activity began.
   bool enabled_ = false, emergency_ = false, loading_ = false, recording_ = false;
-  std::vector<double> setpoints_m_,
-      origins_m_;  ///< Origins: where cords were slack, or a run began.
+  std::vector<double> setpoints_m_;
+  std::vector<double> origins_m_;               ///< Where cords were slack, or a run began.
   std::vector<std::optional<double>> goals_m_;  ///< Where this tick's motion is to end exactly.
   std::vector<double> begun_m_;                 ///< Where the activity began.
   std::vector<double> known_m_;                 ///< Last positions read.
